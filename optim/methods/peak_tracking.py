@@ -24,6 +24,7 @@ _STATUS = {
     TrackStatus.PLATEAU: DesignStatus.OPTIMAL,
     TrackStatus.FLAT: DesignStatus.FLAT,
     TrackStatus.NO_RESPONSE: DesignStatus.NO_RESPONSE,
+    TrackStatus.UNDAMPED: DesignStatus.NO_RESPONSE,  # `solve_problem` looks at what was tried
     TrackStatus.STOPPED: DesignStatus.STOPPED,
     TrackStatus.GAPS: DesignStatus.NOT_TRACKED,
     TrackStatus.UNPROVEN: DesignStatus.NOT_TRACKED,

@@ -12,6 +12,7 @@ import numpy as np
 
 from optim.criteria.peak import PEAK
 from optim.problem.words import Aim
+from optim.results.design import DesignStatus
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import NOTHING_KNOWN, Known
@@ -50,11 +51,8 @@ class RobustStatus(Enum):
         "No design within the bounds keeps all limits in the scenarios that count; the one that breaks them "
         "least is given: relax the limits, narrow the uncertainty, or allow wider bounds."
     )
-    NO_RESPONSE = (
-        "The frequency response could not be computed over the whole band for any design tried: use more "
-        "harmonics or a narrower band, and some damping where there is none, which leaves a resonance "
-        "without bound."
-    )
+    NO_RESPONSE = DesignStatus.NO_RESPONSE.value
+    UNDAMPED = DesignStatus.UNDAMPED.value
     UNKNOWN_SCENARIO = (
         "The response could not be computed in a scenario that counts, so the worst case is not known: use "
         "more harmonics, a narrower band, or a smaller uncertainty."

@@ -254,7 +254,8 @@ def _search(search: RobustSearch, drawn: tuple[Scenario, ...], state: _State) ->
         status = _checked_status(search, state, status)
         if status is RobustStatus.OPTIMAL and state.sides["robust"].known.relative > WELL_KNOWN:
             return RobustStatus.NOT_KNOWN
-    return status
+    undamped = status is RobustStatus.NO_RESPONSE and state.nominal.status is DesignStatus.UNDAMPED
+    return RobustStatus.UNDAMPED if undamped else status
 
 
 def _checked_status(search: RobustSearch, state: _State, status: RobustStatus) -> RobustStatus:

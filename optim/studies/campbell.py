@@ -19,7 +19,7 @@ from optim.problem.numbers import number_pair
 from optim.studies.crossings import CampbellDiagram, CampbellStatus, Crossing, OrderResponse, Ranges
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
-from solver.continuation.branch import Branch
+from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.error_estimate import ErrorEstimator
 from solver.continuation.peaks import Peak
@@ -99,6 +99,8 @@ def _status(found: Sequence[OrderResponse], asked: int, *, stopped: bool) -> Cam
     """Return how a diagram of so many orders ended."""
     if stopped and not (len(found) == asked and found[-1].branch.reached):
         return CampbellStatus.STOPPED
+    if any(one.branch.status is BranchStatus.UNDAMPED for one in found):
+        return CampbellStatus.UNDAMPED
     whole = all(one.branch.reached for one in found)
     return CampbellStatus.COMPLETED if whole else CampbellStatus.INCOMPLETE
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
+from solver.results.notes import NOTHING_DAMPS
 from solver.results.told import Piece
 from solver.results.views import Views
 from solver.scene.scene import Scene
@@ -28,6 +29,7 @@ class CampbellStatus(Enum):
         "A response ended before the end of its range, so peaks may be missing: its own status says why. Try "
         "more harmonics or a narrower band."
     )
+    UNDAMPED = NOTHING_DAMPS
     STOPPED = "The diagram was stopped before all responses were computed."
 
 

@@ -33,7 +33,9 @@ from solver.contacts.kernels.system import (
 )
 from solver.jit.fourier import Complex, Flags, Real
 from solver.linear.assembly import linear_model
+from solver.linear.condensation import force_amplitudes
 from solver.linear.kernels.receptance import excitation
+from solver.linear.modal import matrices_of
 from solver.matrices.normal_modes import hermitian, undamped_modes
 
 # What the entries of the matrices are off by, and sums of what cancels, found on random scenes.
@@ -41,8 +43,10 @@ LOST_BITS = 4.0 * float(np.finfo(float).eps)
 _LOST_SUMS = 16.0  # in units of the former
 _TINY = 1e-300
 _SEEN = 1e-12  # share of a motion, relative to that in other modes, below which it is rounding
-_DRIVEN = 1e-14  # the same of what drives a mode
+_DRIVEN = 64.0 * float(np.finfo(np.longdouble).eps)  # the same of what drives a mode
+_SURELY = 1e-10  # what drives it is known well enough above
 _DAMPED = 1e-4  # damping ratios that are more than rounding, whatever the matrices are
+_AT_RESONANCE = 1e-14  # of a frequency: nearer to one without damping the response is rounding
 _SAME = 1e-9  # relative distance of frequencies below which modes may be turned into each other
 
 
@@ -203,7 +207,7 @@ def _norms(rows: Real | Complex) -> Real:
     return np.sqrt((np.abs(rows) ** 2).sum(axis=-1))  # type: ignore[no-any-return]
 
 
-def resonates_undamped(balance: Balance, low: float, high: float, *, near: float = 0.0) -> bool:
+def resonates_undamped(balance: Balance, low: float, high: float) -> bool:
     """Return whether a resonance that nothing damps lies between two λ and is driven.
 
     Nothing damps a mode whose damping is rounding and in which no contact moves: friction holds a resonance
@@ -211,20 +215,19 @@ def resonates_undamped(balance: Balance, low: float, high: float, *, near: float
 
     Parameters
     ----------
-    low, high : of the frequency [rad/s]; where that is fixed it is looked at there.
-    near : so far outside, relative to the frequency, it counts too.
+    low, high : of the frequency [rad/s]; where that is fixed it is looked at there. A single frequency is
+        at a resonance as near as rounding tells.
     """
     system = balance.system
     if balance.parameter.kind is not Kind.FREQUENCY:
         low = high = system.omega
+    near = _AT_RESONANCE if low == high else 0.0
     ends = min(low, high) * (1.0 - near), max(low, high) * (1.0 + near)
     forced = system.ks > 0 if system.form == DENSE else np.any(system.modal_forces, axis=1) & (system.ks > 0)
     for i in np.flatnonzero(forced):
-        k, modes = int(system.ks[i]), _undamped_modes(balance, int(i))
-        if modes is None:
-            continue
-        inside = (modes.natural >= k * ends[0]) & (modes.natural <= k * ends[1])
-        if any(_grows(modes, natural) for natural in modes.natural[inside]):
+        k = int(system.ks[i])
+        modes = _undamped_modes(balance, int(i), k * ends[0], k * ends[1])
+        if modes is not None and any(_grows(modes, natural) for natural in modes.natural):
             return True
     return False
 
@@ -237,27 +240,33 @@ class _Undamped(NamedTuple):
     forces: Complex  # (m,) relative to the largest
 
 
-def _undamped_modes(balance: Balance, i: int) -> _Undamped | None:
-    """Return the modes of harmonic number i whose damping is rounding; None without any."""
+def _undamped_modes(balance: Balance, i: int, low: float, high: float) -> _Undamped | None:
+    """Return the modes of harmonic number i between two ω whose damping is rounding; None without any."""
     system, s = balance.system, int(balance.system.which[i])
     if system.form == DENSE:
-        return _undamped_of_matrices(balance, i)
+        return _undamped_of_matrices(balance, i, low, high)
     values = system.eigenvalues[s]
     natural = np.sqrt(np.maximum(values.real, 0.0)) if system.form == MODES else values.imag
     loss = natural * system.dampings[s] if system.form == MODES else values.real
     if np.all(np.abs(loss) > _DAMPED * np.abs(natural)):
         return None
     left, right = (_weights(each, np.abs(natural)) for each in balance.sizes[:, :, s])
-    none = (natural > 0.0) & (np.abs(loss) <= LOST_BITS * left * right)
+    none = (natural > 0.0) & (natural >= low) & (natural <= high)
+    none &= np.abs(loss) <= LOST_BITS * left * right
     if not none.any():
         return None
-    return _Undamped(
-        natural[none],
-        *(_relative(each)[..., none] for each in (system.contact_modes[s], system.modal_forces[i])),
-    )
+    contacts, pushed = _relative(system.contact_modes[s]), _relative(system.modal_forces[i])
+    hardly = np.flatnonzero(none & (pushed != 0.0) & (np.abs(pushed) < _SURELY))
+    if system.form == MODES and hardly.size:
+        model, k = linear_model(balance.scene), system.ks[i : i + 1]
+        held = matrices_of(model, model.diameters(k), k > 0)
+        force = force_amplitudes(model, k)[0]
+        sharp = _sharpened(hermitian(held.K[0]), held.M[0], natural[hardly], force)
+        pushed[hardly] = sharp / np.abs(system.modal_forces[i]).max()
+    return _Undamped(natural[none], contacts[..., none], pushed[none])
 
 
-def _undamped_of_matrices(balance: Balance, i: int) -> _Undamped | None:
+def _undamped_of_matrices(balance: Balance, i: int, low: float, high: float) -> _Undamped | None:
     """Return the same of matrices without any damping, whose bases do not move."""
     system, s, model = balance.system, int(balance.system.which[i]), linear_model(balance.scene)
     free = model.free
@@ -275,7 +284,31 @@ def _undamped_of_matrices(balance: Balance, i: int) -> _Undamped | None:
         Z = system.K[s] + 1j * omega * system.C[s] - omega**2 * system.M[s]
         held = np.linalg.solve(Z[:, others][:, :, others], system.forces[i][others][:, None])
         pushed = pushed - np.einsum("fm,mfo,mo->m", found.phi.conj(), Z[:, free][:, :, others], held[..., 0])
-    return _Undamped(natural, *map(_relative, (system.L[s][:, free] @ found.phi, pushed)))
+    inside = (natural > 0.0) & (natural >= low) & (natural <= high)
+    contacts, relative = _relative(system.L[s][:, free] @ found.phi), _relative(pushed)
+    hardly = np.flatnonzero(inside & (relative != 0.0) & (np.abs(relative) < _SURELY))
+    if hardly.size and not others.any():
+        sharp = _sharpened(K, M, natural[hardly], system.forces[i])
+        relative[hardly] = sharp / np.abs(pushed).max()
+    return _Undamped(natural[inside], contacts[:, inside], relative[inside])
+
+
+def _sharpened(K: Complex, M: Complex, natural: Real, force: Complex) -> Complex:
+    """Return what drives modes of some frequencies, to more digits where they hardly move at the force.
+
+    Each is corrected once by the other modes j, φⱼ φⱼᴴ (K − ω² M) φ / (ω² − ωⱼ²), with what it leaves of its
+    equation found in longer numbers.
+    """
+    found = undamped_modes(K, M)
+    every, omega2, phi = np.sqrt(np.maximum(found.omega2, 0.0)), found.omega2, found.phi
+    which = np.abs(every[:, None] - natural).argmin(axis=0)
+    wide = phi[:, which].astype(np.clongdouble)
+    left = K.astype(np.clongdouble) @ wide - (M.astype(np.clongdouble) @ wide) * omega2[which]
+    apart = omega2[which] - omega2[:, None]
+    near = np.abs(apart) <= 2.0 * _SAME * np.abs(omega2[which])
+    shares = np.where(near, 0.0, phi.conj().T @ left / np.where(near, 1.0, apart))
+    force = force.astype(np.clongdouble)
+    return np.asarray((force @ wide.conj()) + (force @ phi.conj()) @ shares.conj(), np.complex128)
 
 
 def _relative(modes: Complex) -> Complex:
@@ -290,4 +323,5 @@ def _grows(modes: _Undamped, natural: float) -> bool:
     _, sizes, rows = np.linalg.svd(motions, full_matrices=False)
     rows = rows[sizes > _SEEN]
     forces = modes.forces[same] - rows.conj().T @ (rows @ modes.forces[same])
-    return bool(np.abs(forces).max(initial=0.0) > _DRIVEN)
+    least = max(_DRIVEN, _SEEN * np.abs(modes.forces[same]).max(initial=0.0))
+    return bool(np.abs(forces).max(initial=0.0) > least)

@@ -16,7 +16,7 @@ from solver.continuation.certificate import PeakCertificate
 from solver.continuation.peaks import Band, Peak
 from solver.results.base import Drawn
 from solver.results.known import Known, Stable, Verdict
-from solver.results.notes import Note
+from solver.results.notes import NOTHING_DAMPS, Note
 from solver.results.views import Views, on_demand
 from solver.scene.scene import Scene
 
@@ -54,10 +54,7 @@ class BranchStatus(Enum):
         "drifts a little further every period. Press it harder, take away what pulls it to one side, or hold "
         "it by a spring."
     )
-    UNDAMPED = (
-        "In the range there is a resonance and no damping, so that nothing bounds the "
-        "response: give the structure some (damping_ratio = 0.001, say)."
-    )
+    UNDAMPED = NOTHING_DAMPS
     POWER_LOST = (
         "Beyond the last point the balance is satisfied as far as rounding shows, but the power put in is "
         "not what is dissipated: no such motion exists. Press parts that contacts alone hold harder, hold "

@@ -36,7 +36,6 @@ from solver.scene.scene import Scene
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
 
-AT_RESONANCE = 1e-14  # of a frequency: nearer to one without damping the response is rounding
 NEARBY = 0.9  # of a frequency: there, an undamped resonance is no reason for a large receptance
 
 
@@ -118,7 +117,7 @@ def describe(
     """Turn a converged point of a frequency balance into a `Solution`, with its error estimate or without."""
     balance = workspace.balance
     omega = 2.0 * math.pi * frequency_hz
-    if resonates_undamped(balance, omega, omega, near=AT_RESONANCE):
+    if resonates_undamped(balance, omega, omega):
         failed = _failure(balance, frequency_hz, found, time.perf_counter() - begun)
         return replace(failed, status=SolutionStatus.UNDAMPED)
     error = truncation_error(workspace, found.u, omega) if estimated else UNKNOWN

@@ -12,6 +12,10 @@ from solver.results import units
 from solver.results.told import Piece
 
 ABOVE_FRICTION = "mean_load_above_friction"
+NOTHING_DAMPS = (
+    "In the range there is a resonance and no damping, so that nothing bounds the response: give the "
+    "structure some (damping_ratio = 0.001, say)."
+)
 FLAGS: Mapping[str, str] = MappingProxyType(
     {
         "mean_undetermined": "the mean, and with it max|x|, depends on the history: go by half peak to peak",

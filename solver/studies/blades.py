@@ -175,6 +175,8 @@ def blade_peaks(
         )  # fmt: skip
     if not whole and branch.reached:
         peaks, highest = highest_peaks(branch, names)
+        if not highest.reached:  # known by its peaks to have no damping
+            return _of_every_blade(name, names[:1], highest, len(names), on_progress, should_stop)
         return BladePeaks(
             dof=name, value=np.array([peak.value for peak in peaks]),
             at_hz=np.array([peak.at for peak in peaks]), status=(branch.status,) * len(names),

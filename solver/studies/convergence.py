@@ -47,7 +47,8 @@ def _highest_peak(scene: Scene, should_stop: ShouldStop) -> tuple[Branch, float]
     """Return the response over the scene's band and the frequency of its highest peak [Hz]."""
     branch = sweep(scene, should_stop=should_stop)
     if branch.peak is None:
-        raise SettingError("frequency_hz", None, "is needed: the scene's band gave no response")
+        ended = branch.status.value.rstrip(".")
+        raise SettingError("frequency_hz", None, f"is needed: the scene's band gave no response ({ended})")
     return branch, branch.peak.at
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from solver.balance.balance import check_harmonics
-from solver.continuation.branch import Branch
+from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.peaks import Peak
@@ -75,11 +75,13 @@ class _DamperResponses:
         self.scene, self._limit, self._harmonics, self._should_stop = scene, limit, harmonics, should_stop
         self._rows = judged_rows(scene)
         self.parts: list[Branch] = []
+        self.undamped = False  # one of them, so that it has no peak
 
     def used(self, level: float) -> Used | None:
         """Return what is used most at a level; None where the response does not cover the band."""
         there = self.scene.with_values({AMPLITUDE: level})
         branch = sweep(there, harmonics=self._harmonics, should_stop=self._should_stop)
+        self.undamped = self.undamped or branch.status is BranchStatus.UNDAMPED
         if not branch.reached or branch.peak is None:
             return None
         self.parts.append(branch)
@@ -138,7 +140,7 @@ def margin_diagram(
     stress, used = (np.full((len(every), points), math.nan) for _ in range(2))
     found: list[AllowedExcitation] = []
     parts: list[Branch] = []
-    done = holes = stopped = 0
+    done = holes = undamped = stopped = 0
     for d, (name, changed) in enumerate(every.items()):
         level = _DamperResponses(changed, limit, harmonics, should_stop)
         seen: list[Used | None] = []
@@ -152,10 +154,12 @@ def margin_diagram(
             if on_progress is not None:
                 on_progress(done / (points * len(every)), done)
         holes += sum(one is None for one in seen)
-        parts += level.parts
         found.append(_allowed(name, level, levels, seen))
+        parts += level.parts
+        undamped += level.undamped
     strengths = any(one.material is not None for one in scene.recovery)
     status = MarginStatus.HOLES if holes else MarginStatus.COMPLETED
+    status = MarginStatus.UNDAMPED if undamped else status
     if stopped or (should_stop is not None and should_stop()):
         status = MarginStatus.STOPPED
     return MarginDiagram(
@@ -173,7 +177,9 @@ def _allowed(
     """Return what a damper allows, by the first of its levels at which what is allowed is used up."""
     first = next((i for i, one in enumerate(seen) if one is not None and one.used >= 1.0), None)
     amplitude, there = math.nan, None
-    if first is None:
+    if None in seen[: len(seen) if first is None else first]:
+        end = "unknown"
+    elif first is None:
         end = "above"
         there = max((one for one in seen if one is not None), key=lambda one: one.used, default=None)
     elif first == 0:

@@ -10,6 +10,7 @@ from typing import Annotated, ClassVar
 from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
+from solver.results.notes import NOTHING_DAMPS
 from solver.results.told import Piece
 from solver.results.views import Data, Views
 
@@ -19,6 +20,7 @@ class MarginStatus(Enum):
 
     COMPLETED = "Every response was computed."
     HOLES = "Some responses do not cover the band and are empty: use more harmonics or a narrower band."
+    UNDAMPED = NOTHING_DAMPS
     STOPPED = "Stopped by the caller: what is empty was not reached."
 
 
@@ -31,7 +33,9 @@ class AllowedExcitation(Piece):
         FloatOrNaN, "Excitation at which what is allowed is reached first, in its unit; NaN if it is not."
     ]
     end: Annotated[
-        str, "``within``, ``below``: it is reached before the range begins, or ``above``: not up to its end."
+        str,
+        "``within``, ``below``: it is reached before the range begins, ``above``: not up to its end, or "
+        "``unknown``: a level below has no response.",
     ]
     row: Annotated[str, "What reaches it, a recovered stress or the observed DOF."]
     at_hz: Annotated[FloatOrNaN, "Frequency of that peak [Hz]."]

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
-from solver.continuation.branch import Branch
+from solver.continuation.branch import Branch, BranchStatus
 from solver.errors import SettingError, check_count
 from solver.response.known import relative_sum
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
@@ -135,7 +135,7 @@ def joined_study(
     ]  # fmt: skip
     return MistuningStudy(
         scene=scene.name, of=tuple(of), spread=spread, tuned=replace(tuned, branches=()), disks=tuple(found),
-        branches=(), n_harmonics=harmonics, status=_status(compared, found), seconds=seconds,
+        branches=(), n_harmonics=harmonics, status=_status(tuned, found), seconds=seconds,
     )  # fmt: skip
 
 
@@ -170,9 +170,12 @@ def worst_branch(peaks: BladePeaks) -> tuple[Branch, ...]:
     return () if found is None else (found,)
 
 
-def _status(compared: bool, disks: Sequence[MistunedDisk]) -> MistuningStatus:
+def _status(tuned: BladePeaks, disks: Sequence[MistunedDisk]) -> MistuningStatus:
     """Return how a study ended that was not stopped."""
-    if not compared:
+    every = (tuned, *(disk.peaks for disk in disks))
+    if any(BranchStatus.UNDAMPED in peaks.status for peaks in every):
+        return MistuningStatus.UNDAMPED
+    if not tuned.largest > 0.0:
         return MistuningStatus.NO_RESPONSE
     known = all(disk.known for disk in disks)
     return MistuningStatus.COMPLETED if known else MistuningStatus.INCOMPLETE

@@ -13,6 +13,7 @@ import numpy as np
 from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
+from solver.results.notes import NOTHING_DAMPS
 from solver.results.order_statistics import quantile_json
 from solver.results.told import Piece
 from solver.results.views import Data, Views
@@ -36,6 +37,7 @@ class MistuningStatus(Enum):
         "The tuned disk has no peak to compare with, or its response did not reach the end of the band: use "
         "another band or an excitation above 0."
     )
+    UNDAMPED = NOTHING_DAMPS
     STOPPED = "The study was stopped by the caller: the figures are those of the disks so far."
 
 

@@ -144,13 +144,13 @@ def test_a_response_that_ends_early_is_not_clear() -> None:
     ended = campbell_diagram(
         scene, speeds_rpm=(12.0, 15.0), orders=[1], limit=1e9, band_hz=(0.05, 0.3), harmonics=3
     )
-    assert ended.status is CampbellStatus.INCOMPLETE
+    assert ended.status is CampbellStatus.UNDAMPED
     assert ended.clear is None
     assert not ended.reached
     nothing = campbell_diagram(
         scene, speeds_rpm=(12.0, 15.0), band_hz=(1.0 / (2.0 * math.pi), 0.3), limit=1.0, harmonics=3
     )
-    assert nothing.status is CampbellStatus.INCOMPLETE
+    assert nothing.status is CampbellStatus.UNDAMPED
     assert nothing.orders[0].highest_running is None
     obj = json.loads(json.dumps(nothing.to_json(), allow_nan=False))
     assert obj["orders"][0]["peaks"] == []

@@ -2,6 +2,7 @@
 
 import importlib
 import json
+import math
 import pkgutil
 import re
 from collections.abc import Callable
@@ -215,3 +216,17 @@ def test_a_wedge_whose_peak_is_not_known_is_not_called_the_best() -> None:
     answer = found.to_json()
     assert answer["measure"] == "half_peak_to_peak"
     assert "mean_undetermined" in answer["flags"]
+
+
+@pytest.mark.parametrize(
+    ("error", "peak", "words"),
+    [
+        (1e-6, 1e-3, ["1 µm of max|x|, 0.1 %"]),
+        (5.9e-15, 0.0, ["not known"]),  # of no peak
+        (math.nan, 1e-3, ["not known"]),
+        (0.0, 1e-3, ["0 m of max|x|, 0 %"]),
+    ],
+)
+def test_an_error_is_told_once(error: float, peak: float, words: list[str]) -> None:
+    known = Known(peak_max_abs=peak, error_estimate=error)
+    assert [value for name, value in known.pairs() if name == "estimated error"] == words

@@ -353,7 +353,7 @@ def test_without_any_response_it_says_so() -> None:
     result = optim.robust_design(
         scene, uncertain={"damper.mu": [0.01, 0.02]}, variables={"damper.N0": (0.5, 1.0)}, harmonics=1
     )
-    assert result.status is RobustStatus.NO_RESPONSE
+    assert result.status is RobustStatus.UNDAMPED
     assert result.robust is None
     json.dumps(result.to_json(), allow_nan=False)
 

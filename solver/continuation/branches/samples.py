@@ -16,6 +16,7 @@ import numpy as np
 
 from solver.balance.balance import build
 from solver.balance.parameter import Kind
+from solver.balance.rounding import resonates_undamped
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.point_by_point import is_unique
@@ -38,7 +39,7 @@ def sampled(
 ) -> Branch | None:  # fmt: skip
     """Return the response at a few frequencies of a range [Hz], without peaks.
 
-    None if it is not unique, or a frequency has no solution.
+    None if it is not unique, nothing damps it, or a frequency has no solution.
     """
     begun = time.perf_counter()
     balance = build(scene, harmonics=harmonics)
@@ -51,6 +52,8 @@ def sampled(
     workspace = Workspace.of(balance)
     solver = NodeSolver(workspace)
     first, last = map(balance.parameter.inside, (start, stop))
+    if resonates_undamped(balance, first, last):
+        return None
     count = max(LEAST, math.ceil(abs(math.log(last / first)) / STEP))
     places = np.geomspace(first, last, count + 1).tolist()
     node, status = solver.at(places[0], [], math.copysign(1.0, last - first)), BranchStatus.COMPLETED

@@ -312,11 +312,16 @@ def with_points(branch: Branch, points: Points) -> Branch:
 
 
 def with_error(branch: Branch, workspace: Workspace | None = None) -> Branch:
-    """Return a branch with the estimated error of its highest peak, if that was left out."""
+    """Return a branch with the estimated error of its highest peak, if that was left out.
+
+    One whose highest peak is rounding has no damping, and no peaks.
+    """
     if math.isfinite(branch.error_estimate) or not branch.peaks:
         return branch
     follow = None if branch.status is BranchStatus.STOPPED else highest_between
     error = branch_error(workspace or Workspace.of(branch.balance), Points.of(branch), branch.peaks, follow)
+    if error == math.inf:
+        return replace(branch, status=BranchStatus.UNDAMPED, peaks=(), band=None)
     return replace(branch, error_estimate=error)
 
 

@@ -20,8 +20,10 @@ import numpy as np
 from solver.balance.balance import Balance
 from solver.balance.kernels.linearised_contacts import forces_at
 from solver.balance.kernels.output import MAX_ABS
+from solver.balance.kernels.residual import evaluate
 from solver.balance.more_harmonics import more_harmonics, pad
 from solver.balance.parameter import Kind
+from solver.balance.rounding import observed_rounding
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import DENSE, MODES
 from solver.continuation.branch import Points
@@ -30,6 +32,7 @@ from solver.continuation.extrema.error_estimate import SAFETY, ErrorEstimator
 from solver.continuation.extrema.kernels.suspects import find_reaching
 from solver.continuation.peaks import Peak
 from solver.jit.fourier import Complex, Flags, Real
+from solver.linear.kernels.receptance import receptance
 from solver.scene.harmonics import among, spread
 
 # Follows a balance between two λ from a first guess; returns the highest peak there, None without a solution.
@@ -78,6 +81,8 @@ def branch_error(
 ) -> float:
     """Estimate the error of the highest peak of a branch [m]; NaN if there is none.
 
+    It is infinite where rounding alone may be as much as the peak: nothing that is known damps it.
+
     Parameters
     ----------
     points : of the branch.
@@ -93,6 +98,8 @@ def branch_error(
         for peak in _rivals(peaks)
     ]
     estimate = errors[0]
+    if estimate >= peaks[0].value and _is_rounding(workspace, peaks[0]):
+        return math.inf
     if not math.isfinite(estimate):
         return math.nan
     reached = max(p.value + e for p, e in zip(_rivals(peaks), errors, strict=True) if math.isfinite(e))
@@ -102,6 +109,17 @@ def branch_error(
         for one in look.above(reached)[:_FOLLOWED]:
             reached = max(reached, look.followed(one, follow))
     return max(estimate, reached - peaks[0].value)
+
+
+def _is_rounding(workspace: Workspace, peak: Peak) -> bool:
+    """Return whether no digit of a maximum over the frequency is more than rounding."""
+    parameter = workspace.balance.parameter
+    if not peak.interior or parameter.kind is not Kind.FREQUENCY:
+        return False
+    p = float(parameter.inside(peak.at))
+    receptance(workspace.system, p, workspace.linear)
+    evaluate(workspace.system, workspace.linear, peak.solution, p, 0.0, workspace.point)
+    return not observed_rounding(workspace, peak.solution, p, across=True) < peak.value
 
 
 def _rivals(peaks: tuple[Peak, ...]) -> tuple[Peak, ...]:

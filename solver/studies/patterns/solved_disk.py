@@ -11,6 +11,7 @@ from typing import Annotated
 import numpy as np
 
 from solver.arrays import Real
+from solver.continuation.branch import BranchStatus
 from solver.errors import SettingError
 from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene
@@ -24,7 +25,11 @@ FLAT = 1e-7  # rise of the logarithm of a peak at which a climb ends
 
 
 class UnknownPeakError(Exception):
-    """The response of a disk did not reach the end of its band."""
+    """The response of a disk did not reach the end of its band, or it has none without damping."""
+
+    def __init__(self, *, undamped: bool = False) -> None:
+        super().__init__()
+        self.undamped = undamped
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,7 +172,7 @@ class SolvedDisk:
                 should_stop=self._should_stop,
             )  # fmt: skip
             if not math.isfinite(found.largest):
-                raise UnknownPeakError
+                raise UnknownPeakError(undamped=BranchStatus.UNDAMPED in found.status)
             at = TWO_PI * float(found.at_hz[found.worst])
             self._last = key, found
             self._known[key] = DiskPeak(value=found.largest, blade=found.worst, omega=at)

@@ -214,8 +214,7 @@ def _linear(search: DiskSearch, how: Contacts) -> dict[str, Any]:
     search.steps = starts + count * (1 + search.worst_of_patterns * (starts // _FEWER))
     limit = search.limit(how)
     if limit is None:
-        undamped = search.disk(how).undamped
-        return _nothing() | ({"status": WorstMistuningStatus.UNDAMPED} if undamped else {})
+        return _nothing(undamped=search.disk(how).undamped)
     N, tuned = limit.whole.sectors, limit.tuned
     climbs = search.worst(limit, np.zeros(N), starts)
 
@@ -252,8 +251,10 @@ def _solved(search: DiskSearch, disk: SolvedDisk) -> dict[str, Any]:
     search.steps = len(limits) * asked.starts + each + 1 + count + on_top
     try:
         tuned = disk.peak(nothing)
-    except UnknownPeakError:
-        return _nothing() | ({"status": WorstMistuningStatus.STOPPED} if not search.go_on() else {})
+    except UnknownPeakError as unknown:
+        return _nothing(undamped=unknown.undamped) | (
+            {} if search.go_on() else {"status": WorstMistuningStatus.STOPPED}
+        )
     if not tuned.value > 0.0:
         return _nothing()
     known = True
@@ -322,10 +323,10 @@ def _told(delta: Real, found: DiskPeak, tuned: DiskPeak) -> PatternPeak:
     )  # fmt: skip
 
 
-def _nothing() -> dict[str, Any]:
+def _nothing(*, undamped: bool = False) -> dict[str, Any]:
     return {
         "tuned_peak": math.nan, "tuned_at_hz": math.nan, "worst": None, "alike": 0,
-        "status": WorstMistuningStatus.NO_RESPONSE,
+        "status": WorstMistuningStatus.UNDAMPED if undamped else WorstMistuningStatus.NO_RESPONSE,
     }  # fmt: skip
 
 

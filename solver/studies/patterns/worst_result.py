@@ -25,10 +25,7 @@ class WorstMistuningStatus(Enum):
         "use more harmonics or another band."
     )
     NO_RESPONSE = MistuningStatus.NO_RESPONSE.value
-    UNDAMPED = (
-        "A mode of the disk in the band has no damping, so that nothing bounds its peak: give the structure "
-        "some (damping_ratio = 0.001, say)."
-    )
+    UNDAMPED = MistuningStatus.UNDAMPED.value
     STOPPED = "The search was stopped by the caller: the worst is that of the patterns so far."
 
 

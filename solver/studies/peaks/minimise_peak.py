@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver.balance.simplifications import Effects
+from solver.continuation.branch import BranchStatus
 from solver.errors import SettingError, check_count
 from solver.first_use import renamed
 from solver.results.watch import shows_progress
@@ -177,7 +178,8 @@ def _search(
         found = None
         tracker.ask()
         if not tracker.lines:
-            status = TrackStatus.NO_RESPONSE
+            undamped = any(look.branch.status is BranchStatus.UNDAMPED for look in tracker.looks)
+            status = TrackStatus.UNDAMPED if undamped else TrackStatus.NO_RESPONSE
         elif len(tracker.looks) >= MOST_LOOKS:
             status = TrackStatus.UNPROVEN
         else:

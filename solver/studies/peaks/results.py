@@ -13,6 +13,7 @@ from solver.errors import SettingError
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
 from solver.results.measures import OF_X, Measured
+from solver.results.notes import NOTHING_DAMPS
 from solver.results.told import Piece
 from solver.results.views import Data, Views
 
@@ -45,6 +46,7 @@ class TrackStatus(Enum):
         "The highest tracked peak is on a response that a sweep does not reach: compare sweeps of your own."
     )
     NO_RESPONSE = "No frequency response could be computed: start somewhere else, or use more harmonics."
+    UNDAMPED = NOTHING_DAMPS
     STOPPED = "The tracking was stopped by the caller."
     WORK_USED_UP = (
         "The work allowed was used up before the optimum was proven; the best value seen is given: use a "

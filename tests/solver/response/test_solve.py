@@ -179,9 +179,9 @@ def test_json():
     solution = solve(bladed_disk(), frequency_hz=755.0)
     obj = json.loads(json.dumps(solution.to_json(), allow_nan=False))
     keys = (
-        "scene frequency_hz converged status max_abs half_peak_to_peak mean harmonics flags contacts "
-        "stable stable_ground unique unique_ground residual error_estimate n_harmonics newton_iterations "
-        "seconds"
+        "scene measured frequency_hz converged status max_abs half_peak_to_peak mean harmonics flags notes "
+        "contacts stable stable_ground unique unique_ground residual error_estimate n_harmonics "
+        "newton_iterations seconds"
     )
     assert list(obj) == keys.split()
     assert obj["max_abs"] == solution.max_abs

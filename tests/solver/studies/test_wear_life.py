@@ -222,6 +222,18 @@ def test_what_a_normal_stiffness_takes_is_differentiated_by_it(kind: str, *, at_
         np.testing.assert_allclose(slopes[:, i], expected, rtol=2e-4, atol=1e-6)
 
 
+def test_a_limit_exceeded_from_the_beginning_has_no_slope() -> None:
+    """A little more load does not make it later: it is exceeded at 0 h still."""
+    found = _run(_oscillator(12.0), 0.1 / FADE, frequency_hz=0.95, harmonics=1)
+    limit = 0.9 * float(found.amplitude[0])
+    run = _run(
+        _oscillator(12.0), 0.1 / FADE, frequency_hz=0.95, harmonics=1, limit=limit, paths=("damper.N0",)
+    )
+    assert run.hours_to_limit == 0.0
+    assert np.all(np.isnan(run.limit_slopes))
+    assert "exceeded from the beginning" in [value for block in run.blocks() for _, value in block.pairs]
+
+
 def test_the_limit_is_reached_when_the_response_says_so() -> None:
     scene = _oscillator(12.0)
     found = _run(scene, 0.6 / FADE, frequency_hz=0.95, harmonics=5, tolerance=1e-9, points=9)

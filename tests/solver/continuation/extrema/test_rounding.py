@@ -62,7 +62,13 @@ def shifted(scene: Scene, angle: float) -> Scene:
 
 @pytest.mark.parametrize("seeds", [range(30), pytest.param(range(30, 300), marks=pytest.mark.long)])
 def test_the_estimate_does_not_depend_on_the_origin_of_time(seeds: range) -> None:
-    """Within 1 %, but where it is above half of the amplitude: hardly a number."""
+    """Within 1 %, but where it is above half of the amplitude at some origin.
+
+    There the first order says more than the amplitude, and what counts is whether Newton's method finds a
+    solution with more harmonics far away, which rounding decides. Such an estimate says that the amplitude is
+    hardly known, and it does at every origin.
+    """
+    loose = 0
     for seed in seeds:
         scene, hertz, harmonics = random_scene(seed)
         told = []
@@ -75,8 +81,12 @@ def test_the_estimate_does_not_depend_on_the_origin_of_time(seeds: range) -> Non
             assert measures is not None
             told.append((error.max_abs, error.half_peak_to_peak, *measures.values[:2]))
         estimates, amplitudes = np.array(told)[:, :2], np.array(told)[:, 2:]
-        few = estimates.max() < 0.5 * amplitudes.max(axis=0)
-        assert np.all((np.ptp(estimates, axis=0) <= 0.01 * estimates.min(axis=0))[few]), seed
+        same = np.ptp(estimates, axis=0) <= 0.01 * estimates.min(axis=0)
+        if not np.all(same):
+            loose += 1
+            assert np.any(estimates >= 0.5 * amplitudes), seed
+            assert np.all(estimates >= 0.1 * amplitudes), seed
+    assert loose <= 0.01 * len(seeds)
 
 
 def test_a_harmonic_of_zero_does_not_change_the_estimate() -> None:

@@ -1,5 +1,6 @@
 """Further basins by the coarse stage: what they cost, against sweeps, and that the proof stays as it is."""
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -150,3 +151,15 @@ def check_random(seed: int, points: int) -> None:
 )
 def test_random_scenes(seed: int, points: int) -> None:
     check_random(seed, points)
+
+
+def test_minima_that_are_not_proven_are_told_apart() -> None:
+    """A peak was followed to there; a higher one may stand beside it."""
+    best = least_peak(scene_of("two-dof"), "damper.N0", 60.0, 150.0, harmonics=1)
+    first = best.basins[0]
+    basins = (first, *(replace(first, at=at, proven=proven) for at, proven in ((70.0, True), (80.0, False))))
+    told = dict(pair for block in replace(best, basins=basins).blocks() for pair in block.pairs)
+    assert told["other minima"].endswith(" at 70")
+    assert told["perhaps other minima"].startswith("at least ")
+    assert told["perhaps other minima"].endswith(" at 80")
+    assert "other minima" not in dict(pair for block in best.blocks() for pair in block.pairs)

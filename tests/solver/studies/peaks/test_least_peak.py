@@ -231,7 +231,7 @@ def test_no_response_says_so() -> None:
     scene = oscillator({"kt": 0.3, "mu": 0.3, "N0": 0.5}, k=1.0)
     observe = scene.observe.model_copy(update={"band": (1.0 / (2.0 * math.pi), 0.3)})
     best = least_peak(scene.model_copy(update={"observe": observe}), "damper.N0", 0.1, 0.6, harmonics=3)
-    assert best.status is TrackStatus.NO_RESPONSE
+    assert best.status is TrackStatus.UNDAMPED
     assert not best.status.proven
     assert math.isnan(best.at)
     assert best.sweeps == 5
