@@ -121,9 +121,7 @@ def limited_design(seed: int) -> LimitedDesign:
     kinds = [list(MEASURED)[seed % len(MEASURED)]]
     kinds += [str(rng.choice(BESIDE))] if rng.random() < 0.4 else []
     asked = _without_limits(rng, seed, kinds[0], 2 if seed // len(MEASURED) % 3 == 2 else 1)
-    limits: list[Limit] = []
-    for kind in dict.fromkeys(kinds):
-        limits += _limit(rng, asked, kind)
+    limits = [_limit(rng, asked, kind) for kind in dict.fromkeys(kinds)]
     for limit in limits:
         asked |= limit.keys()
     if rng.random() < 0.3:
@@ -185,21 +183,19 @@ def _with_a_body() -> Scene:
     })  # fmt: skip
 
 
-def _limit(rng: np.random.Generator, asked: dict[str, Any], kind: str) -> list[Limit]:
-    """A limit at a value that a share of a few designs keep, or a little off; none where there is none."""
+def _limit(rng: np.random.Generator, asked: dict[str, Any], kind: str) -> Limit:
+    """A limit at a value that a share of a few designs keep, or a little off."""
     scene = asked["scene"]
     drawn: Any = tuple(float(hertz) for hertz in np.sort(rng.uniform(*scene.observe.band, 2)))
     if kind == "separation":
-        return [Limit(kind, scene.contacts[0].name, 0.0)]
+        return Limit(kind, scene.contacts[0].name, 0.0)
     if kind in ("damping", "quality"):
         drawn = float(10.0 ** rng.uniform(-2.0, 0.0))
     problem = pose(**asked | Limit(kind, drawn, 1.0).keys())
     known = [max(MEASURED[kind](one, drawn) for one in swept(problem, place)) for place in grid(problem, 12)]
-    finite = [value for value in known if 0.0 < value < math.inf]
-    if not finite:
-        return []
+    finite = [value for value in known if 0.0 < value < math.inf] or [1.0]  # 1: kept by all, or by none
     share, off = rng.choice([0.0, 0.05, 0.1, 0.3, 0.7]), 1.0 + rng.choice([-0.05, 1e-3, 0.02])
-    return [Limit(kind, drawn, float(np.quantile(finite, share)) * off)]
+    return Limit(kind, drawn, float(np.quantile(finite, share) * off))
 
 
 def grid(problem: Problem, count: int) -> list[dict[str, float]]:
