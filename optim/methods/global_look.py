@@ -3,17 +3,13 @@
 The look takes corners, middles and a Sobol sequence of designs; local searches begin from those that no
 neighbour beats; then designs are added wherever the slopes of what was seen say that something better than
 the best end may lie (`optim.methods.surrogate`), until nothing does, or a few rounds have found nothing. What
-the local searches found is compared with every design looked at. With several variables half the harmonics
-serve for the look: it only ranks designs, by as much as both differ where both were computed, and none of its
-numbers is kept.
+the local searches found is compared with every design looked at (`optim.methods.look`).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -26,72 +22,17 @@ from optim.methods.kkt import (
     LocalSearch,
     ModelOf,
     ended,
-    is_flat,
     of_limits,
     standing,
     without_limits,
 )
-from optim.methods.surrogate import (
-    Taylor,
-    between,
-    candidates,
-    places,
-    promising,
-    quasi_random,
-    taylor_of,
-)
-from optim.problem.variables import Real, scaled, snapped, unscaled
+from optim.methods.look import BETTER, WORTH, Look
+from optim.methods.pattern_search import polished
+from optim.methods.surrogate import Taylor, taylor_of
+from optim.problem.variables import Real, scaled, unscaled
 
-FIRST_STEP = 0.01  # scaled
-LAST_STEP = 1e-7
-MOST = 40  # designs for each variable
-SMALLER = 0.35
-
-
-def polished(search: DesignSearch, local: Local) -> Local:
-    """Return the end of a pattern search from where a local search was stuck."""
-    n = len(search.variables)
-    rng = np.random.default_rng(0)
-    here, step, left = local.evaluation, FIRST_STEP, MOST * n
-    best = local.standing
-    lead: Real | None = None
-    while step >= LAST_STEP and left > 0:
-        z = scaled(search.variables, here.values)
-        moved = False
-        for direction in _directions(n, rng, lead):
-            place = snapped(z + step * direction)
-            if left <= 0 or np.array_equal(place, z):
-                continue
-            left -= 1
-            trial = search(unscaled(search.variables, place))
-            if trial.good and _standing(search, trial) < best:
-                here, best, lead, moved = trial, _standing(search, trial), direction, True
-                break
-        step *= 1.0 / SMALLER if moved else SMALLER
-        lead = lead if moved else None
-    return ended(here, search.model(here), search.variables)
-
-
-def _standing(search: DesignSearch, evaluation: DesignEvaluation) -> tuple[float, float]:
-    return standing(search.model(evaluation))
-
-
-def _directions(n: int, rng: np.random.Generator, lead: Real | None) -> list[Real]:
-    """Return the directions to try: the last that succeeded, both ways along an orthogonal basis."""
-    basis = np.eye(n) if n == 1 or rng.random() < 0.5 else np.linalg.qr(rng.normal(size=(n, n)))[0]
-    return ([] if lead is None else [lead]) + [sign * column for column in basis.T for sign in (1.0, -1.0)]
-
-
-FEWEST = 3  # harmonics of a look with several variables, at least
-# Designs of a look for each variable, and so many more, before what was seen says which others are worth one:
-# the middles and the two corners where all variables have one bound, and some between.
-SURE = 3
-LOOSE = 2.0  # spreads by which a prediction may be too high there
-WORTH = 1.3  # how much higher than the best end the potential of a design to start from may be
 PATIENCE = 20  # designs of a local search, after which it ends if it is far behind the best end
 FAR_OFF = 0.01  # relative excess over a limit that is
-BETTER = 1e-6  # relative difference from which a design is better than another
-BATCH = 4  # designs a round and variable
 IDLE = 3  # rounds in a row that find nothing, after which a look is finished
 IDLE_MANY = 2  # the same with more than two variables
 MOST_ROUNDS = 16
@@ -99,12 +40,7 @@ ON_THE_WAY = (1.0 / 3.0, 2.0 / 3.0)  # to a known end, where it is looked at whe
 LOOK_AHEAD = 2  # better designs of a local search from one such look to the next
 SMALL = 1e-6  # share of the way along which a slope is taken
 MOST_BEGINS = 4  # designs that the first local searches begin from
-APART = {1: 1.0 / 256.0, 2: 0.02}  # scaled distance from which two designs of a look are two
-APART_MANY = 0.05
-# Before it is said that no design keeps the limits: designs for each variable, designs to begin from, and
-# halvings of the range of one variable everywhere and where the limits may be kept.
-MORE_EACH, BEGINS_EACH, SEED = 64, 4, 7
-COARSE, FINEST = 6, 10
+BEGINS_EACH = 4  # and for each variable before it is said that no design keeps the limits
 
 
 class WholeRange:
@@ -120,22 +56,14 @@ class WholeRange:
         self.search, self.found = search, found
         self.finished = False
         self._local_search = local_search
-        self._n = len(search.variables)
-        few = max(FEWEST, (search.problem.harmonics + 1) // 2)
-        few = few if self._n > 1 else search.problem.harmonics
-        few = min((one.harmonics for one in seen), default=few)
-        self._scout = search if few >= search.problem.harmonics else search.scout(few)
-        self._seen = [one for one in seen if one.harmonics == few]
+        self._look = Look(search, found, seen)
         self._starts: list[Real] = []
         self._ends: list[tuple[Local, DesignEvaluation]] = []  # with the numbers of the look
-        self._apart = APART.get(self._n, APART_MANY)
-        self._off = 0.0  # natural logarithm by which the look's harmonics are off
-        self._slack = 0.0  # relative excess over limits that they show of designs that keep them
 
     @property
     def looked_at(self) -> tuple[DesignEvaluation, ...]:
         """Every design of the look, in order."""
-        return tuple(self._seen)
+        return tuple(self._look.seen)
 
     def run(self, given: Iterable[Mapping[str, float]]) -> bool | None:
         """Search; `given`: designs to begin from besides those of the look.
@@ -145,15 +73,11 @@ class WholeRange:
         True if nothing depends on the variables, None if no response could be computed.
         """
         try:
-            begin = [] if self._seen else list(places(self._n))
-            self._ahead(z for i, z in enumerate(begin) if i < SURE * (self._n + 1))
-            for i, z in enumerate(begin):
-                if i < SURE * (self._n + 1) or self._worth(z):
-                    self._look(z)
+            self._look.first()
             begins = [e for values in given if (e := self.search(values)).good]
-            if not self._seen and not begins:
+            if not self._look.seen and not begins:
                 return None
-            if self._flat():
+            if self._look.flat():
                 return True
             self._starts_given(begins)
             self._rounds()
@@ -161,111 +85,44 @@ class WholeRange:
             if not self._feasible() and self.search.problem.limits.any:
                 self._everywhere()
         finally:
-            if self._scout is not self.search:
-                self.search.scouting_done(self._scout)
+            if not self._look.whole:
+                self.search.scouting_done(self._look.scout)
         return False
-
-    def _worth(self, z: Real) -> bool:
-        """Return whether a place of the look may be one to start from, as far as what was seen tells."""
-        if self._n == 1 or not self._seen:
-            return True
-        models = self._models()
-        known = np.array([model.place for model in models])
-        mean, spread = between(models, known, z[None, :])
-        least = min(model.value for model in models)
-        return bool(mean[0] - LOOSE * spread[0] < WORTH * least)
-
-    def _flat(self) -> bool:
-        """Return whether no design depends on any variable, with all harmonics too."""
-        if not self._seen or not all(is_flat(self._scout.model(e)) for e in self._seen):
-            return False
-        return all(is_flat(self.search.model(e)) for e in self._exact(self._seen[:2]))
-
-    def _ahead(self, several: Iterable[Real]) -> None:
-        self._scout.ahead(unscaled(self.search.variables, z) for z in several)
-
-    def _look(self, z: Real) -> None:
-        """Look at a design."""
-        evaluation = self._scout(unscaled(self.search.variables, z))
-        if evaluation.good:
-            self._seen.append(evaluation)
-
-    def _exact(self, some: Iterable[DesignEvaluation]) -> list[DesignEvaluation]:
-        """Return designs of the look with all harmonics, those that can be computed."""
-        if self._scout is self.search:
-            return list(some)
-        chosen = list(some)
-        self.search.ahead(e.values for e in chosen)
-        exact = [self.search(e.values) for e in chosen]
-        return [e for e in exact if e.good]
 
     def _starts_given(self, begins: list[DesignEvaluation]) -> None:
         for begin in begins:
             self._descend(begin)
-        known = bool(begins) and self._n == 1  # the tracked optima without limits are among them
-        if self.search.problem.limits.any and self._seen and not known:
+        known = bool(begins) and self._look.n == 1  # the tracked optima without limits are among them
+        if self.search.problem.limits.any and self._look.seen and not known:
             # Limits that do not bind must not make a search worse: begin from what is best without them.
-            least = min(self._seen, key=lambda e: e.objective)
-            for begin in self._exact([least]):
+            least = min(self._look.seen, key=lambda e: e.objective)
+            for begin in self._look.exact([least]):
                 free = self._local(begin, lambda e: without_limits(self.search.model(e)))
                 self._descend(free)
 
     def _everywhere(self) -> None:
-        """Look for the least excess over the limits before it is said that no design keeps them."""
-        if self._n == 1:
-            kept = self._between_all()
-        else:
-            more = quasi_random(self._n, 2 ** math.ceil(math.log2(MORE_EACH * self._n)), SEED)
-            self._ahead(more)
-            for z in more:
-                self._look(z)
-            kept = self._least_excess()
-        if kept is not None:
-            self._descend(kept)
+        """Look wherever the limits may be kept before it is said that no design keeps them."""
+        self._look.where_kept()
+        self._from_least()
+        if self._feasible():
             self._rounds()
             self._last()
 
-    def _between_all(self) -> DesignEvaluation | None:
-        """Return a design that keeps all limits, of one variable: the range is halved wherever one may lie.
-
-        That is where the slope of the excess at one end of an interval leads to none before the other end.
-        """
-        for _ in range(FINEST):
-            models = sorted(self._models(), key=lambda model: float(model.place[0]))
-            middles = [
-                0.5 * (one.place + other.place)
-                for one, other in pairwise(models)
-                if (wide := float((other.place - one.place)[0])) > 2.0**-FINEST
-                and (wide > 2.0**-COARSE or _may_keep(one, other))
-            ]
-            if not middles:
-                return None
-            self._ahead(middles)
-            for z in middles:
-                self._look(z)
-                last = self._seen[-1]
-                if self.search.model(last).violation <= KEPT:
-                    return last
-        return None
-
-    def _least_excess(self) -> DesignEvaluation | None:
-        """Return a design that keeps all limits, from those of the look that exceed them least."""
-        begun: list[Real] = []
-        for one in sorted(self._seen, key=lambda e: self._scout.model(e).violation):
+    def _from_least(self) -> None:
+        """Search for a design that keeps all limits from those of the look that exceed them least."""
+        left = BEGINS_EACH * self._look.n
+        for one in sorted(self._look.seen, key=lambda e: self._look.scout.model(e).violation):
+            if left == 0 or self._feasible():
+                return
             z = scaled(self.search.variables, one.values)
-            if all(np.abs(z - other).max() >= 2.0 * self._apart for other in begun):
-                begun.append(z)
-                for exact in self._exact([one]):
-                    here = self._eased(exact, self.search)
-                    if self.search.model(here).violation <= KEPT:
-                        return here
-            if len(begun) >= BEGINS_EACH * self._n:
-                break
-        return None
+            if all(np.abs(z - other).max() >= 2.0 * self._look.apart for other in self._starts):
+                left -= 1
+                for exact in self._look.exact([one]):
+                    self._descend(exact)
 
     def _rounds(self) -> None:
         """Alternate between local searches and further looks until these find nothing."""
-        idle, most = 0, max(self.search.problem.basins, min(2 + self._n, MOST_BEGINS))
+        idle, most = 0, max(self.search.problem.basins, min(2 + self._look.n, MOST_BEGINS))
         for turn in range(MOST_ROUNDS):
             before = self._best()
             for _ in range(most):
@@ -273,20 +130,18 @@ class WholeRange:
                 begins = self._begins()
                 for begin in begins:
                     self._starts.append(scaled(self.search.variables, begin.values))
-                for exact in self._exact(begins):
+                for exact in self._look.exact(begins):
                     self._descend(exact)
                 if not begins:
                     break
             after = self._best()
             idle = 0 if turn == 0 or _beats(after, before) else idle + 1
-            enough = IDLE if self._n <= 2 else IDLE_MANY
-            more = [] if idle >= enough else self._further(turn)
+            enough = IDLE if self._look.n <= 2 else IDLE_MANY
+            more = [] if idle >= enough else self._look.further(turn)
             if not more:
                 self.finished = True
                 return
-            self._ahead(more)
-            for z in more:
-                self._look(z)
+            self._look.at(more)
             most = 2
 
     def _best(self) -> tuple[float, float]:
@@ -313,17 +168,9 @@ class WholeRange:
             return
         best = min(ends, key=lambda local: local.standing)
         self.found.append(best)
-        there = best.evaluation
-        if self._scout is not self.search:
-            there = self._scout(best.evaluation.values)
-        if there.good:
+        there = self._look.ended(best)
+        if there is not None:
             self._ends.append((best, there))
-            if self._scout is not self.search:
-                exact, rough = best.evaluation.objective, there.objective
-                self._off = max(self._off, abs(math.log(max(exact, 1e-300) / max(rough, 1e-300))))
-                if best.feasible:
-                    self._slack = max(self._slack, self._scout.model(there).violation)
-            self._seen.append(there)
 
     def _feasible(self) -> bool:
         """Return whether an end keeps all limits."""
@@ -372,16 +219,16 @@ class WholeRange:
         ways = [scaled(self.search.variables, local.evaluation.values) - z for local, _ in better]
         nearest = min(range(len(ways)), key=lambda i: float(np.abs(ways[i]).max()))
         way = ways[nearest]
-        end = taylor_of(self._scout.model(better[nearest][1]), feasibility=broken).value
+        end = taylor_of(self._look.scout.model(better[nearest][1]), feasibility=broken).value
         if not _falls(taylor_of(self.search.model(here), feasibility=broken), way):
             return False
         last = math.inf
         for share in ON_THE_WAY:
-            there = self._scout(unscaled(self.search.variables, z + share * way))
+            there = self._look.scout(unscaled(self.search.variables, z + share * way))
             if not there.good:
                 return False
-            self._seen.append(there)
-            one = taylor_of(self._scout.model(there), feasibility=broken)
+            self._look.seen.append(there)
+            one = taylor_of(self._look.scout.model(there), feasibility=broken)
             if not end < one.value < last or not _falls(one, way):
                 return False
             last = one.value
@@ -396,50 +243,21 @@ class WholeRange:
     def _ended(self, there: DesignEvaluation) -> Local:
         return ended(there, self.search.model(there), self.search.variables)
 
-    def _infeasible(self) -> bool:
-        """Return whether no design known keeps all limits."""
-        known = (*self._seen, *(local.evaluation for local in self.found))
-        return all(self._scout.model(e).violation > KEPT for e in known)
-
-    def _models(self) -> list[Taylor]:
-        """Return what the designs of the look tell of others: of what is minimised, or of the limits."""
-        feasibility = self._infeasible()
-        models = [self._scout.model(e) for e in self._seen]
-        if not feasibility:
-            models = [replace(model, excess=model.excess - self._slack) for model in models]
-        return [taylor_of(model, feasibility=feasibility) for model in models]
-
     def _begins(self) -> list[DesignEvaluation]:
         """Return the next design of the look to start from, if any.
 
         No neighbour beats it, and it may lead below the best.
         """
-        models = self._models()
-        if not models:
+        if not self._look.seen:
             return []
-        known = np.array([model.place for model in models])
-        values = np.array([model.value for model in models])
-        distance = np.abs(known[:, None, :] - known).max(axis=2)
-        count = min(2 * self._n + 1, len(models))
-        near = np.argpartition(distance, count - 1, axis=1)[:, :count]
-        reach = np.sort(distance, axis=1)[:, min(2, len(models) - 1)]
-        minima = np.flatnonzero(values <= values[near].min(axis=1))
-        if self._n == 1:
-            order = np.argsort(known[:, 0])
-            line = np.concatenate([[np.inf], values[order], [np.inf]])
-            minima = order[(line[1:-1] <= line[:-2]) & (line[1:-1] <= line[2:])]
-        potential: dict[int, float] = {}
-        for i in minima.tolist():
-            around = np.clip(known[i] + reach[i] * self._around(), 0.0, 1.0)
-            potential[i] = float(models[i].at(around).min())
-        best = values.min() * math.exp(self._off)
-        ends = [scaled(self.search.variables, local.evaluation.values) for local in self.found]
-        started = np.array([*self._starts, *ends]).reshape(-1, self._n)
-        wanted = self._distinct() < self.search.problem.basins
-        for i in sorted(potential, key=lambda i: potential[i]):
-            fresh = not len(started) or np.abs(started - known[i]).max(axis=1).min() >= self._apart
-            if fresh and (wanted or potential[i] <= WORTH * best):
-                return [self._seen[i]]
+        ends = [local.evaluation for local in self.found]
+        started = [*self._starts, *(scaled(self.search.variables, end.values) for end in ends)]
+        wanted, enough = self._distinct() < self.search.problem.basins, WORTH * self._look.least()
+        for potential, one in self._look.minima():
+            z = scaled(self.search.variables, one.values)
+            fresh = all(np.abs(z - other).max() >= self._look.apart for other in started)
+            if fresh and (wanted or potential <= enough):
+                return [one]
         return []
 
     def _distinct(self) -> int:
@@ -447,21 +265,9 @@ class WholeRange:
         places: list[Real] = []
         for local in self.found:
             z = scaled(self.search.variables, local.evaluation.values)
-            if all(np.abs(z - other).max() > self._apart for other in places):
+            if all(np.abs(z - other).max() > self._look.apart for other in places):
                 places.append(z)
         return len(places)
-
-    def _around(self) -> Real:
-        return np.vstack([np.zeros(self._n), 2.0 * candidates(self._n, 1)[:64] - 1.0])
-
-    def _further(self, turn: int) -> list[Real]:
-        """Return places to look at, where what is known leaves room for something better than the best."""
-        models = self._models()
-        if not models:
-            return []
-        enough = min(model.value for model in models)
-        enough *= (1.0 - BETTER) * math.exp(self._off)
-        return promising(models, candidates(self._n, turn), enough, self._apart, BATCH * min(self._n, 3))
 
     def _last(self) -> None:
         """Go on from a design that beats every end; without slopes from an end that did not settle."""
@@ -512,12 +318,6 @@ class _Watched:
         if self._count >= PATIENCE and self._whole.behind(self._best):
             raise JoinedError
         return found
-
-
-def _may_keep(one: Taylor, other: Taylor) -> bool:
-    """Return whether an excess counted from 1 may fall to none between two designs, by value and slopes."""
-    ahead, back = one.at(other.place[None, :])[0], other.at(one.place[None, :])[0]
-    return bool(min(one.value, other.value, ahead, back) <= 1.0 + KEPT)
 
 
 def _falls(model: Taylor, way: Real) -> bool:

@@ -125,8 +125,9 @@ def candidates(n: int, seed: int) -> Real:
 
 
 def promising(
-    models: Sequence[Taylor], places: Real, enough: float, apart: float, most: int, *, above: bool = False
-) -> list[Real]:
+    models: Sequence[Taylor], places: Real, enough: float, apart: float, most: int, *, above: bool = False,
+    doubt: float = DOUBT,
+) -> list[Real]:  # fmt: skip
     """Return the places where a number may be below (above) `enough`, the most promising first.
 
     Parameters
@@ -137,6 +138,7 @@ def promising(
     apart : least distance, the largest over the coordinates, from what was looked at and from each other.
     most : how many.
     above : what is looked for is larger than `enough`.
+    doubt : spreads by which a prediction may be too high.
     """
     known = np.array([model.place for model in models])
     far = np.abs(places[:, None, :] - known).max(axis=2)
@@ -144,7 +146,7 @@ def promising(
     if not len(places):
         return []
     mean, spread = between(models, known, places)
-    low = (-mean if above else mean) - DOUBT * spread
+    low = (-mean if above else mean) - doubt * spread
     chosen: list[Real] = []
     for i in np.argsort(low):
         if low[i] >= (-enough if above else enough) or len(chosen) >= most:

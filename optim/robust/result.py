@@ -48,8 +48,8 @@ class RobustStatus(Enum):
         "slip): choose others."
     )
     INFEASIBLE = (
-        "No design within the bounds keeps all limits in the scenarios that count; the one that breaks them "
-        "least is given: relax the limits, narrow the uncertainty, or allow wider bounds."
+        "No design tried keeps all limits in the scenarios that count; the one that breaks them least is "
+        "given: relax the limits, narrow the uncertainty, allow wider bounds or give a start that keeps them."
     )
     NO_RESPONSE = DesignStatus.NO_RESPONSE.value
     UNDAMPED = DesignStatus.UNDAMPED.value

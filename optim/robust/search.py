@@ -12,7 +12,7 @@ from optim.criteria.evaluation import natural_scales
 from optim.criteria.linearised import Model
 from optim.criteria.rows import DesignEvaluation
 from optim.methods.evaluator import SearchStoppedError
-from optim.methods.kkt import Local
+from optim.methods.kkt import KEPT, Local, of_limits
 from optim.methods.minimax import REMEMBERED, minimax_search
 from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Scenario, UncertainSet
@@ -159,6 +159,11 @@ class RobustSearch:
         if not found.settled and self.aim is not Aim.QUANTILE:
             again = self._searched(found.evaluation, scenarios, REMEMBERED)
             found = min(found, again, key=lambda local: (local.standing, not local.settled))
+        if not found.feasible:
+            # What is minimised may lead out of limits that can be kept, to an end that breaks them.
+            kept = self._searched(begin, scenarios, 0, of=of_limits, enough=1.0 + KEPT).evaluation
+            if self.model(kept, len(scenarios)).violation <= KEPT:
+                found = self._searched(kept, scenarios, 0, strict=True)
         self._tell(found, len(scenarios))
         return found
 
@@ -184,11 +189,15 @@ class RobustSearch:
             )
         )  # fmt: skip
 
-    def _searched(self, begin: DesignEvaluation, scenarios: Sequence[Scenario], remembered: int) -> Local:
+    def _searched(
+        self, begin: DesignEvaluation, scenarios: Sequence[Scenario], remembered: int,
+        of: Callable[[Model], Model] = lambda model: model, **more: Any,
+    ) -> Local:  # fmt: skip
         """Return the end of the minimax search over scenarios that keeps so many designs' rows as cuts."""
         return minimax_search(
             lambda there: self.evaluation(there, scenarios), self.variables, begin,
-            lambda evaluation: self.model(evaluation, len(scenarios)), ball=True, remembered=remembered,
+            lambda evaluation: of(self.model(evaluation, len(scenarios))), ball=True, remembered=remembered,
+            **more,
         )  # fmt: skip
 
     def objective(self, local: Local, count: int) -> float:

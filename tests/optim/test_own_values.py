@@ -31,28 +31,32 @@ def displaces(variable: str, own: str) -> bool:
     return owner == other and its in (key, TIED.get(key))
 
 
+def chosen_of(chance: np.random.Generator, paths: list[str], count: int) -> list[str]:
+    """So many paths, none of which is another way to say another."""
+    while True:
+        chosen = [str(path) for path in chance.choice(paths, size=count, replace=False)]
+        if not any(displaces(one, other) for one in chosen for other in chosen if one != other):
+            return chosen
+
+
 @pytest.mark.few(12)
 @pytest.mark.parametrize("seed", range(200))
 def test_a_case_that_sets_a_variable_is_refused_with_its_name(seed: int) -> None:
     chance = np.random.default_rng(seed)
     name = ("two-dof", "bladed-disk")[seed % 2]
     scene, paths = solver.load_scene(name), paths_of(name)
-    chosen = [str(path) for path in chance.choice(paths, size=1 + seed % 3, replace=False)]
+    chosen = chosen_of(chance, paths, 1 + seed % 3)
     wanted = chance.choice(chosen)
     others = [path for path in paths if displaces(wanted, path)] if chance.random() < 0.7 else paths
     own = str(chance.choice(others))
     value = float(chance.uniform(*BOUNDS[own.partition(".")[2]]))
-    if any(displaces(one, other) for one in chosen for other in chosen if one != other):
-        return  # variables that say one thing twice are another matter
     keys: dict[str, Any] = {
         "variables": {path: BOUNDS[path.partition(".")[2]] for path in chosen},
         "cases": [{"name": "plain"}, {"name": "own", "set": {own: value}, "weight": 0.5}],
     }
-    if seed % 5 == 0 and len(chosen) == 1:  # paths that share a value
+    if seed % 5 == 0 and len(chosen) == 1 and chosen[0].endswith(("N0", "N1", "kt")):  # that share a value
         keys["variables"] = {f"excitation.amplitude,{chosen[0]}": BOUNDS["amplitude"]}
         chosen = ["excitation.amplitude", chosen[0]]
-        if chosen[0] == chosen[1] or chosen[1].endswith(("mu", "ratio")):
-            return
     if not any(displaces(one, own) for one in chosen):
         case = pose(scene, **keys).cases[1].scene
         after = case.with_values({path: BOUNDS[path.partition(".")[2]][0] for path in chosen})
