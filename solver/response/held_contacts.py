@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -13,7 +14,7 @@ from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.linear.contact_table import port_counts
 from solver.response.contact_response import ContactResponse, ContactState
-from solver.response.solution import Solution
+from solver.scene.scene import Scene
 
 # A force with a circular limit that differs from kt u + c by less, relative to it, has not slipped.
 SLIPS = 1e-6
@@ -55,14 +56,12 @@ class HeldContact:
         return float(lost)
 
 
-def held_contacts(solution: Solution) -> tuple[HeldContact, ...]:
+def held_contacts(scene: Scene, contacts: Sequence[ContactResponse]) -> tuple[HeldContact, ...]:
     """Return what sticks all the time and can hold a force."""
-    begins = np.append(0, np.cumsum(port_counts(solution.scene))).tolist()
+    begins = np.append(0, np.cumsum(port_counts(scene))).tolist()
     return tuple(
         HeldContact(given=slider, found=response, number=number, begin=begins[number])
-        for number, (contact, response) in enumerate(
-            zip(solution.scene.contacts, solution.contacts, strict=True)
-        )
+        for number, (contact, response) in enumerate(zip(scene.contacts, contacts, strict=True))
         for slider in held_sliders(contact.friction, response)
     )
 
@@ -85,7 +84,7 @@ def _sticks(slider: Slider, response: ContactResponse) -> bool:
     return float(slips.max(initial=0.0)) <= SLIPS * largest
 
 
-def instants_of(solution: Solution) -> Real:
-    """Return angles over the period, (n,), at which forces and limits are compared."""
-    n = max(_INSTANTS, 8 * solution.observed.size)
+def instants_of(size: int) -> Real:
+    """Return angles over the period at which forces of motions of `size` coefficients are compared, (n,)."""
+    n = max(_INSTANTS, 8 * size)
     return np.linspace(0.0, 2.0 * math.pi, n, endpoint=False)

@@ -71,7 +71,7 @@ class History:
 
 def history_of(solution: Solution) -> History:
     """Return what a converged response does not say without its history."""
-    sticking, scene = held_contacts(solution), solution.scene
+    sticking, scene = held_contacts(solution.scene, solution.contacts), solution.scene
     given = all(contact.load_is_given for contact in scene.contacts)
     pairs = zip(scene.contacts, solution.contacts, strict=False)
     if any(contact.friction is None and found.state is ContactState.STUCK for contact, found in pairs):
@@ -113,7 +113,7 @@ def _every_one(solution: Solution, sticking: tuple[HeldContact, ...]) -> bool:
 
 def _sticks_from_rest(solution: Solution, sticking: tuple[HeldContact, ...]) -> bool:
     """Return whether what sticks has certainly not slipped on the way from rest."""
-    tau = instants_of(solution)
+    tau = instants_of(solution.observed.size)
     room = [contact.limit(tau) - contact.given.size(contact.forces(tau)) for contact in sticking]
     if any(np.any(each <= 0.0) for each in room):
         return False

@@ -12,7 +12,7 @@ The derivatives of the upper end follow from those of f and μN at the instant w
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -37,11 +37,11 @@ class Room:
     up: Annotated[float, "How far it may rise [N]."]
     down_at: Annotated[float, "The instant that leaves no more [rad]."]
     up_at: Annotated[float, "Likewise [rad]."]
+    mean: Annotated[float, "Of the force as it is [N]."]
 
 
-def rooms_of(solution: Solution, sticking: tuple[HeldContact, ...]) -> Iterator[Room]:
-    """Yield the room of every direction of what sticks."""
-    tau = instants_of(solution)
+def rooms_of(sticking: Sequence[HeldContact], tau: Real) -> Iterator[Room]:
+    """Yield the room of every direction of what sticks, by its forces at the instants `tau` (n,)."""
     for held in sticking:
         limit, forces = held.limit(tau), held.forces(tau)
         for port, force in zip(held.ports, forces, strict=False):
@@ -49,7 +49,7 @@ def rooms_of(solution: Solution, sticking: tuple[HeldContact, ...]) -> Iterator[
             first, second = int(np.argmin(down)), int(np.argmin(up))
             yield Room(
                 held=held, port=port, down=max(float(down[first]), 0.0), up=max(float(up[second]), 0.0),
-                down_at=float(tau[first]), up_at=float(tau[second]),
+                down_at=float(tau[first]), up_at=float(tau[second]), mean=float(force.mean()),
             )  # fmt: skip
 
 
@@ -59,7 +59,7 @@ def mean_range(solution: Solution, sticking: tuple[HeldContact, ...]) -> tuple[f
     if gains is None:
         return math.nan, math.nan
     low = high = solution.mean
-    for room in rooms_of(solution, sticking):
+    for room in rooms_of(sticking, instants_of(solution.observed.size)):
         rises, falls = shares(gains[:, room.port])
         # The mean moves by −gain Δf.
         low -= rises * room.up + falls * room.down

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from solver.results import units
 
 ABOVE_FRICTION = "mean_load_above_friction"
+WORST_MEAN, MEAN_STRESS_OPEN = "worst_mean", "mean_stress_open"
 FLAGS: Mapping[str, str] = MappingProxyType(
     {
         "mean_undetermined": "the mean, and with it max|x|, depends on the history: go by half peak to peak",
@@ -26,6 +27,13 @@ FLAGS: Mapping[str, str] = MappingProxyType(
         ),
         "travelling_wave_assumed": (
             "the response is assumed to be the travelling wave, compare with --effects every-sector"
+        ),
+        WORST_MEAN: (
+            "where the mean depends on the history, a stress is judged by the worst mean that stuck contacts "
+            "may hold"
+        ),
+        MEAN_STRESS_OPEN: (
+            "how large a mean stress stuck contacts hold is not known: margins are those of an unloaded start"
         ),
     }
 )
