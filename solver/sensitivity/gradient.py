@@ -279,7 +279,7 @@ class Sensitivities:
         if system.centred == FROM_REST:
             return self._turns[:1].copy(), np.ones(1), np.zeros((1, 1))
         turns = self._tops[:, SIGN, None] * np.exp(1j * np.outer(self._tops[:, TAU], system.ks))
-        by_half, by_mean, seconds = 1.0, 0.0, (0.0, 0.0, 0.0)
+        by_half, by_mean, seconds = 1.0, 0.0, [0.0, 0.0, 0.0]
         if system.centred == UTILISED:
             high, low = (turns @ self._amplitudes.of(self._x)).real
             _, by_half, by_mean, *seconds = utilisation(system.haigh, high, -low)
