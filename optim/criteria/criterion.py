@@ -216,6 +216,9 @@ class CriterionRow(Piece):
         "Computes the exact second derivatives by the variables, (n_variables, n_variables), NaN where "
         "they do not exist; None where the solver has none.",
     ] = field(default=None, compare=False, repr=False)
+    flags: Annotated[
+        tuple[str, ...], "What its value assumes or leaves open, see `solver.results.notes.FLAGS`."
+    ] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return it as one JSON object, value and bound as results say them."""

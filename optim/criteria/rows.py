@@ -15,6 +15,7 @@ from optim.criteria.band import BAND
 from optim.criteria.criterion import Criterion, CriterionRow
 from optim.criteria.peak import PEAK
 from solver.continuation.branch import Branch
+from solver.results.notes import MEAN_STRESS_OPEN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +44,11 @@ class DesignEvaluation:
     def good(self) -> bool:
         """Whether every number is known."""
         return bool(self.rows) and all(math.isfinite(row.value) for row in self.rows)
+
+    @property
+    def open(self) -> bool:
+        """Whether a row may be worse than it says."""
+        return any(MEAN_STRESS_OPEN in row.flags for row in self.rows)
 
     def of(self, quantity: Criterion) -> tuple[CriterionRow, ...]:
         """Return the rows of one quantity, largest first."""

@@ -2,12 +2,14 @@
 
 The mean is the static stress of the row with the middle of the motion's range. Where it moves with the
 frequency the peak of the utilisation is not that of the stress; it is looked for as its own, with exact
-gradient and second derivatives (`solver.balance.kernels.haigh`). Where the mean leaves nothing, rows count
-on: what is minimised alone is then limited to what has an end, and results say inf.
+gradient and second derivatives (`solver.balance.kernels.haigh`). Where the mean depends on the history, the
+worst that stuck contacts may hold has a row of its own (`solver.response.worst_mean`). Where the mean leaves
+nothing, rows count on: what is minimised alone is then limited to what has an end, and results say inf.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key
@@ -16,6 +18,7 @@ from optim.criteria.peak import maxima
 from optim.criteria.stress import by_row, leading, of_row, seen_by
 
 if TYPE_CHECKING:
+    from solver.continuation.peaks import Peak
     from solver.scene.parts import Recovered
     from solver.scene.scene import Scene
 
@@ -33,21 +36,39 @@ def _lacking(scene: Scene) -> str:
 def _rows(judged: Judged) -> list[CriterionRow]:
     """A row for every peak of every utilisation that competes."""
     # Loaded here: help of a command, which lists criteria, needs no numbers.
+    from solver.response.worst_mean import used_most
     from solver.scene.materials import ENDLESS, haigh_of
 
     bounds, scene = judged.limit(UTILISATION) or {}, judged.branch.balance.scene
     rows = _judged(scene)
     measures = {one.name: haigh_of(scene, one.name) for one in rows}
     weight = judged.weight(UTILISATION) * judged.case.weight
-    found = [
-        row
-        for one, seen in seen_by(judged, UTILISATION, rows, measures)
-        for row in maxima(
-            seen, UTILISATION, f"utilisation of {one.name}", weight=weight,
-            bound=bounds.get(of_row(one), ENDLESS),
-        )
-    ]  # fmt: skip
+    found = list[CriterionRow]()
+    for one, seen in seen_by(judged, UTILISATION, rows, measures):
+        what, bound = f"utilisation of {one.name}", bounds.get(of_row(one), ENDLESS)
+        most = used_most(seen.branch)
+        these = maxima(seen, UTILISATION, what, weight=weight, bound=bound)
+        if most.worst is not None:
+            these.append(_worst(seen, most.worst, most.free, what, bound, weight))
+        found += [replace(row, flags=most.flags) for row in these]
     return leading(found)
+
+
+def _worst(
+    seen: Judged, peak: Peak, free: frozenset[int], what: str, bound: float, weight: float
+) -> CriterionRow:  # fmt: skip
+    """Return the row of the worst mean that stuck contacts may hold."""
+    from solver.response.worst_mean import WorstMeanSlopes
+    from solver.sensitivity.nonsmooth import peak_gradient
+
+    by_paths = None
+    if seen.gradients:
+        slopes = WorstMeanSlopes(seen.branch.balance, seen.problem.paths, free)
+        by_paths = peak_gradient(slopes, peak).gradient
+    return seen.row(
+        UTILISATION, f"{what} at {peak.at:.6g} Hz, by the worst mean that stuck contacts may hold",
+        peak.value, by_paths, at_hz=peak.at, bound=bound, weight=weight,
+    )  # fmt: skip
 
 
 def _read(asked: CriterionContext) -> Any:

@@ -90,12 +90,13 @@ def _doubt_at_peaks(problem: Problem, evaluation: DesignEvaluation) -> float:
 
 
 def honest(result: DesignResult) -> DesignResult:
-    """Return a result that claims an optimum only if its highest peak is known, by what was minimised."""
+    """Return a result that claims an optimum only if its highest peak and what limits it are known."""
     result = result.with_errors()
     problem, evaluation = result.problem, result.evaluation
     if result.status not in CLAIMS or evaluation is None:
         return result
-    if well_known(problem, evaluation) and _by_its_measure(problem, evaluation) is problem:
+    known = well_known(problem, evaluation) and not evaluation.open
+    if known and _by_its_measure(problem, evaluation) is problem:
         return result
     return replace(result, status=DesignStatus.NOT_KNOWN)
 

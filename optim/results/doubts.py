@@ -94,10 +94,11 @@ def _checked(checked: Sequence[Checked], optimum: Mapping[str, float], *, feasib
 
 
 def _flags(evaluation: DesignEvaluation) -> list[str]:
-    """The flags of the responses, each once."""
+    """The flags of the responses and the rows, each once."""
     own = (flag for one in evaluation.responses for flag in one.branch.flags)
     at_peaks = (flag for _, known in known_parts(evaluation) for flag in known.flags)
-    return flag_words(dict.fromkeys((*own, *at_peaks)))
+    of_rows = (flag for row in evaluation.rows for flag in row.flags)
+    return flag_words(dict.fromkeys((*own, *at_peaks, *of_rows)))
 
 
 def doubt_of(known_parts: Iterable[tuple[str, Known]], weights: Mapping[str, float]) -> float:

@@ -29,7 +29,6 @@ more from no motion, and says so if it finds one, but no more than that.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -38,23 +37,21 @@ import numpy as np
 from solver.balance.workspace import Workspace
 from solver.contacts.laws.parts import Slider
 from solver.jit import fourier
-from solver.jit.fourier import Complex, Real
+from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
-from solver.linear.condensation import CANCELLED_STIFFNESS
-from solver.linear.contact_table import port_counts, port_stiffnesses
+from solver.linear.contact_table import port_stiffnesses
 from solver.linear.model import LinearModel
-from solver.matrices.normal_modes import hermitian, least_stiffness
-from solver.response.contact_response import ContactResponse, ContactState
+from solver.matrices.normal_modes import hermitian
+from solver.response.contact_response import ContactState
+from solver.response.held_contacts import HeldContact, held_contacts, instants_of
+from solver.response.mean_range import mean_range, of_diameters
 from solver.response.solution import Solution
 from solver.response.start_from_rest import Start, keeps_sticking
 from solver.response.time_history import all_coordinates
 
 _TURN = 2.0 * math.pi
-# A force with a circular limit that differs from kt u + c by less, relative to it, has not slipped.
-SLIPS = 1e-6
 _ELSEWHERE = 1e-5  # relative difference of two motions beyond which they are two
 _ROUNDING = 1e-10  # of a damping matrix
-_INSTANTS = 360  # at least, over the period
 # What a transient may do between two instants 0.1 rad of its fastest motion apart, relative: (0.1)²/8.
 _BETWEEN = 2e-3
 
@@ -72,43 +69,9 @@ class History:
     ]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Contact:
-    """What sticks all the time under one limit, its contact's answer, and where that begins in the ports."""
-
-    given: Slider
-    found: ContactResponse
-    begin: int
-
-    @property
-    def ports(self) -> list[int]:
-        """The motions it follows among the ports of all contacts, that of the load last."""
-        normal = self.given.normal_port
-        own = (*self.given.ports, *(() if normal is None else (normal,)))
-        return [self.begin + port for port in own]
-
-    def forces(self, tau: Real) -> Real:
-        """Return the friction force [N], (directions, n)."""
-        parts = [self.found.forces[port] for port in self.given.ports]
-        return np.array([fourier.basis(tau, (part.size - 1) // 2) @ part for part in parts])
-
-    def limit(self, tau: Real) -> Real:
-        """Return μN [N], (n,)."""
-        load = self.found.load
-        return np.asarray(self.given.mu * (fourier.basis(tau, (load.size - 1) // 2) @ load))
-
-    def lost(self, moved: Real) -> float:
-        """Return the most that motions of all ports up to `moved` [m] take of the room to the limit [N]."""
-        away, given = moved[self.ports], self.given
-        lost = given.size(given.pull(away[: len(given.ports)]))
-        if given.normal_port is not None:
-            lost = lost + given.mu * given.normal_stiffness * away[-1]
-        return float(lost)
-
-
 def history_of(solution: Solution) -> History:
     """Return what a converged response does not say without its history."""
-    sticking, scene = _sticking(solution), solution.scene
+    sticking, scene = held_contacts(solution.scene, solution.contacts), solution.scene
     given = all(contact.load_is_given for contact in scene.contacts)
     pairs = zip(scene.contacts, solution.contacts, strict=False)
     if any(contact.friction is None and found.state is ContactState.STUCK for contact, found in pairs):
@@ -121,7 +84,7 @@ def history_of(solution: Solution) -> History:
     mean_open = not (bounded and _sticks_from_rest(solution, sticking))
     return History(
         mean_open=mean_open, half_range_open=mean_open and not given,
-        mean_range=_mean_range(solution, sticking) if given else (math.nan, math.nan),
+        mean_range=mean_range(solution, sticking) if given else (math.nan, math.nan),
     )  # fmt: skip
 
 
@@ -142,48 +105,15 @@ def has_another_solution(workspace: Workspace, u: Real, p: float, *, from_nothin
     return float(np.abs(other.u - u).max(initial=0.0)) > _ELSEWHERE * float(np.abs(u).max(initial=0.0))
 
 
-def _sticking(solution: Solution) -> tuple[_Contact, ...]:
-    """Return what sticks all the time and can hold a force."""
-    begins = np.append(0, np.cumsum(port_counts(solution.scene))).tolist()
-    return tuple(
-        _Contact(given=slider, found=response, begin=begin)
-        for contact, response, begin in zip(solution.scene.contacts, solution.contacts, begins, strict=False)
-        for slider in held_sliders(contact.friction, response)
-    )
-
-
-def held_sliders(friction: Slider | None, response: ContactResponse) -> tuple[Slider, ...]:
-    """Return those of the sliders of a contact, one for each limit, that are held all the time."""
-    sliders = () if friction is None else friction.limited
-    return tuple(slider for slider in sliders if _sticks(slider, response))
-
-
-def _every_one(solution: Solution, sticking: tuple[_Contact, ...]) -> bool:
+def _every_one(solution: Solution, sticking: tuple[HeldContact, ...]) -> bool:
     """Whether all of every contact sticks; one without friction never does."""
     count = sum(1 if c.friction is None else len(c.friction.limited) for c in solution.scene.contacts)
     return len(sticking) == count
 
 
-def _sticks(slider: Slider, response: ContactResponse) -> bool:
-    """Return whether what has one limit sticks all the time; of a contact that slips one direction may."""
-    if response.state is ContactState.STUCK:
-        return True
-    if not slider.limits_apart or response.state is not ContactState.SLIPPING:
-        return False
-    motions, forces, ports = np.array(response.motions), np.array(response.forces), list(slider.ports)
-    slips = np.abs(forces[ports, 1:] - slider.pull(motions[ports, 1:]))
-    largest = float(np.abs(forces[ports, 1:]).max(initial=0.0))
-    return float(slips.max(initial=0.0)) <= SLIPS * largest
-
-
-def _instants(solution: Solution) -> Real:
-    n = max(_INSTANTS, 8 * solution.observed.size)
-    return np.linspace(0.0, 2.0 * math.pi, n, endpoint=False)
-
-
-def _sticks_from_rest(solution: Solution, sticking: tuple[_Contact, ...]) -> bool:
+def _sticks_from_rest(solution: Solution, sticking: tuple[HeldContact, ...]) -> bool:
     """Return whether what sticks has certainly not slipped on the way from rest."""
-    tau = _instants(solution)
+    tau = instants_of(solution.observed.size)
     room = [contact.limit(tau) - contact.given.size(contact.forces(tau)) for contact in sticking]
     if any(np.any(each <= 0.0) for each in room):
         return False
@@ -227,10 +157,10 @@ class _Fits:
     a transient may take thousands of periods.
     """
 
-    def __init__(self, sticking: tuple[_Contact, ...], angles: Real) -> None:
+    def __init__(self, sticking: tuple[HeldContact, ...], angles: Real) -> None:
         self._sticking, self._angles = sticking, angles
         self._tau = np.zeros(0)
-        self._known: list[tuple[_Contact, Real, Real]] = []
+        self._known: list[tuple[HeldContact, Real, Real]] = []
 
     def __call__(self, moved: Real, tau: Real) -> bool:
         """Judge motions `moved` (n, sectors, n_ports) [m] at `tau` (n,)."""
@@ -247,7 +177,7 @@ class _Fits:
         return all(self._sticks(moved, *known) for known in self._known)
 
     @staticmethod
-    def _sticks(moved: Real, contact: _Contact, limit: Real, forces: Real) -> bool:
+    def _sticks(moved: Real, contact: HeldContact, limit: Real, forces: Real) -> bool:
         away = np.moveaxis(moved[:, :, contact.ports], 2, 0)
         given = contact.given
         if given.normal_port is not None:
@@ -255,13 +185,6 @@ class _Fits:
         change = given.pull(away[: len(given.ports)])
         between = _BETWEEN * np.abs(change).max(axis=(0, 1), initial=0.0)
         return not bool(np.any(given.size(forces + change) + between >= limit))
-
-
-def _of_diameters(model: LinearModel) -> Iterator[tuple[Complex, Complex, Complex]]:
-    """Yield K, C and L at rest at every nodal diameter."""
-    for n in np.arange(model.sectors)[:, None]:
-        K, C, _ = model.at(n, np.zeros(1, np.bool_))
-        yield K[0], C[0], model.ports_at(n)[0]
 
 
 def _compliances(
@@ -278,7 +201,7 @@ def _compliances(
     total = np.zeros((stiffness.size, stiffness.size), dtype=np.complex128)
     if not (model.is_symmetric and model.every_diameter):
         return None
-    for K, damping, L in _of_diameters(model):
+    for _, K, damping, L in of_diameters(model):
         C = hermitian(damping)  # gyroscopic terms do no work
         if np.linalg.eigvalsh(C)[0] < -_ROUNDING * np.abs(C).max():
             return None
@@ -309,7 +232,7 @@ def _start(solution: Solution, model: LinearModel, stiffness: Real) -> Start:
     return Start(model=model, stiffness=stiffness, x=(turns @ amplitudes).real, v=v, omega=omega)
 
 
-def _in_sliders(solution: Solution, model: LinearModel, sticking: tuple[_Contact, ...]) -> float:
+def _in_sliders(solution: Solution, model: LinearModel, sticking: tuple[HeldContact, ...]) -> float:
     """Return Σ f² / (2 kt) over what slips, at the beginning [J]; a part of a force is below its limit."""
     angles = np.arange(model.sectors, dtype=np.float64) * model.interblade_phase % (2.0 * math.pi)
     total = 0.0
@@ -325,41 +248,3 @@ def _in_sliders(solution: Solution, model: LinearModel, sticking: tuple[_Contact
                 squares = np.minimum(squares, along[slider.ports[0]] ** 2)
             total += float(np.sum(squares)) / (2.0 * min(slider.stiffnesses))
     return total
-
-
-def _mean_range(solution: Solution, sticking: tuple[_Contact, ...]) -> tuple[float, float]:
-    """Return bounds of the mean over all residual forces [m].
-
-    The mean moves by −observe K⁻¹ Lᵀ Δf. Two directions are bounded by the rectangle around what each
-    instant leaves, so the bounds may be somewhat wide there; one direction reaches its bounds.
-    """
-    gains = _mean_gains(linear_model(solution.scene))
-    if gains is None:
-        return math.nan, math.nan
-    low = high = solution.mean
-    tau = _instants(solution)
-    for contact in sticking:
-        limit, forces = contact.limit(tau), contact.forces(tau)
-        for port, force in zip(contact.ports, forces, strict=False):
-            room = max(float(np.min(limit + force)), 0.0), max(float(np.min(limit - force)), 0.0)
-            for gain in gains[:, port].tolist():
-                # f may fall by room[0] and rise by room[1], and the mean moves by −gain Δf.
-                low -= room[1] * gain if gain > 0.0 else -room[0] * gain
-                high += room[0] * gain if gain > 0.0 else -room[1] * gain
-    return low, high
-
-
-def _mean_gains(model: LinearModel) -> Real | None:
-    """Return observe K⁻¹ Lᵀ of contacts of each sector [m/N], (sectors, n_ports); None if it is singular or
-    not known at every nodal diameter.
-
-    What rounding leaves of the stiffness against a rigid-body motion is none.
-    """
-    rows = []
-    if not model.every_diameter:
-        return None
-    for K, _, L in _of_diameters(model):
-        if least_stiffness(K) <= CANCELLED_STIFFNESS:
-            return None
-        rows.append(model.observe @ np.linalg.solve(K, L.conj().T))
-    return np.asarray(np.fft.fft(np.array(rows), axis=0).real / model.sectors)

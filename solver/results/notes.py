@@ -12,6 +12,7 @@ from solver.results import units
 from solver.results.told import Piece
 
 ABOVE_FRICTION = "mean_load_above_friction"
+WORST_MEAN, MEAN_STRESS_OPEN = "worst_mean", "mean_stress_open"
 NOTHING_DAMPS = (
     "In the range there is a resonance and no damping, so that nothing bounds the response: give the "
     "structure some (damping_ratio = 0.001, say)."
@@ -33,6 +34,13 @@ FLAGS: Mapping[str, str] = MappingProxyType(
         ),
         "travelling_wave_assumed": (
             "the response is assumed to be the travelling wave, compare with --effects every-sector"
+        ),
+        WORST_MEAN: (
+            "where the mean depends on the history, a stress is judged by the worst mean that stuck contacts "
+            "may hold"
+        ),
+        MEAN_STRESS_OPEN: (
+            "how large a mean stress stuck contacts hold is not known: margins are those of an unloaded start"
         ),
     }
 )

@@ -227,6 +227,14 @@ class Sensitivities:
         everything = self._moved(solution, at_hz)
         return None if everything is None else everything[3].dU
 
+    def forces(self, solution: Real, at_hz: float) -> Real | None:
+        """Return the derivatives of the forces of all contacts, as `motions`."""
+        everything = self._moved(solution, at_hz)
+        if everything is None:
+            return None
+        _, contacts, along, found = everything
+        return np.asarray(contacts.times(found.dU) + contacts.along(along.slopes, along.loads))
+
     def _moved(
         self, solution: Real, at_hz: float
     ) -> tuple[WholeMotion, ContactForces, Directions, Responses] | None:

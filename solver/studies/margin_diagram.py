@@ -3,6 +3,7 @@
 At each level one response gives the peak of the utilisation of every recovered stress with a material.
 The allowed excitation is the first at which one of them is used up, U(level) = 1: between the two levels that
 enclose it by Newton's method with the exact ∂U/∂level of the peak (envelope theorem), kept between them.
+Where a mean is free, U is that of the worst mean (`solver.response.worst_mean`).
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +22,8 @@ from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.peaks import Peak
 from solver.errors import SettingError, at
+from solver.response.worst_mean import WorstMeanSlopes, used_most
+from solver.results.known import Known
 from solver.results.units import STRESS_UNITS
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.materials import haigh_of, utilisation_of
@@ -43,6 +47,15 @@ class Used(NamedTuple):
     peak: Peak
     branch: Branch
     stress: float
+    flags: tuple[str, ...] = ()
+    free: frozenset[int] | None = None
+
+    def slopes(self, *paths: str) -> Sensitivities:
+        """Return what gives its derivatives."""
+        balance = self.branch.balance
+        if self.free is None:
+            return Sensitivities(balance, paths)
+        return WorstMeanSlopes(balance, paths, self.free)
 
 
 def judged_rows(scene: Scene) -> tuple[str, ...]:
@@ -51,19 +64,25 @@ def judged_rows(scene: Scene) -> tuple[str, ...]:
 
 
 def most_used(branch: Branch) -> Used:
-    """Return what is used most, of the stresses of a completed response that have a material."""
-    scene = branch.balance.scene
-    return max((_of_row(branch, row) for row in judged_rows(scene)), key=lambda one: one.peak.value)
+    """Return what is used most, of the stresses of a completed response that have a material.
+
+    Its flags are those of all.
+    """
+    every = [_of_row(branch, row) for row in judged_rows(branch.balance.scene)]
+    flags = tuple(dict.fromkeys(flag for one in every for flag in one.flags))
+    return max(every, key=lambda one: one.peak.value)._replace(flags=flags)
 
 
 def _of_row(branch: Branch, row: str) -> Used:
     """Return how much a recovered stress is used."""
     scene = branch.balance.scene
     seen = observing(branch, row, measure=haigh_of(scene, row), peaks_alone=True)
-    peak = seen.peaks[0]
+    most = used_most(seen)
+    peak = most.highest
     stress = observing(branch, row, measure="half_peak_to_peak", peaks_alone=True).peaks[0].value
     unit = next(one.unit for one in scene.recovery if one.name == row)
-    return Used(utilisation_of(peak.value), row, peak, seen, stress * STRESS_UNITS[unit])
+    used, stress = utilisation_of(peak.value), stress * STRESS_UNITS[unit]
+    return Used(used, row, peak, seen, stress, most.flags, most.free)
 
 
 class _DamperResponses:
@@ -74,7 +93,7 @@ class _DamperResponses:
     ) -> None:  # fmt: skip
         self.scene, self._limit, self._harmonics, self._should_stop = scene, limit, harmonics, should_stop
         self._rows = judged_rows(scene)
-        self.parts: list[Branch] = []
+        self.parts: list[Known] = []
         self.undamped = False  # one of them, so that it has no peak
 
     def used(self, level: float) -> Used | None:
@@ -84,11 +103,13 @@ class _DamperResponses:
         self.undamped = self.undamped or branch.status is BranchStatus.UNDAMPED
         if not branch.reached or branch.peak is None:
             return None
-        self.parts.append(branch)
         if not self._rows:
+            self.parts.append(branch.known)
             used = branch.peak.value / (self._limit or math.nan)
             return Used(used, self.scene.observe.dof, branch.peak, branch, branch.peak.value)
-        return most_used(branch)
+        most = most_used(branch)
+        self.parts.append(replace(branch.known, flags=(*branch.known.flags, *most.flags)))
+        return most
 
     def allowed(self, low: float, high: float) -> tuple[float, Used] | None:
         """Return the level between two at which U = 1 and what is used there; U is below 1 at the lower."""
@@ -100,7 +121,7 @@ class _DamperResponses:
             if abs(found.used - 1.0) <= _SOLVED or high - low <= 1e-14 * high:
                 return level, found
             low, high = (level, high) if found.used < 1.0 else (low, level)
-            slope = peak_gradient(Sensitivities(found.branch.balance, (AMPLITUDE,)), found.peak).gradient[0]
+            slope = peak_gradient(found.slopes(AMPLITUDE), found.peak).gradient[0]
             if not self._rows:
                 slope /= self._limit or math.nan
             step = level + (1.0 - found.used) / slope if slope > 0.0 else math.nan
@@ -139,7 +160,7 @@ def margin_diagram(
     check_harmonics(harmonics)
     stress, used = (np.full((len(every), points), math.nan) for _ in range(2))
     found: list[AllowedExcitation] = []
-    parts: list[Branch] = []
+    parts: list[Known] = []
     done = holes = undamped = stopped = 0
     for d, (name, changed) in enumerate(every.items()):
         level = _DamperResponses(changed, limit, harmonics, should_stop)
@@ -166,7 +187,7 @@ def margin_diagram(
         scene=scene.name, judged_by="utilisation" if strengths else "amplitude",
         unit="Pa" if strengths else scene.observed_unit, level=levels,
         level_unit=parameter_of(scene, AMPLITUDE).unit, stress=stress, used=used, allowed=tuple(found),
-        n_harmonics=harmonics, highest=tuple(one.known for one in parts), status=status,
+        n_harmonics=harmonics, highest=tuple(parts), status=status,
         seconds=time.perf_counter() - begun,
     )  # fmt: skip
 

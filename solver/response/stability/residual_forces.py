@@ -25,7 +25,7 @@ from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.response.contact_response import ContactState, contact_responses
-from solver.response.history_dependence import held_sliders
+from solver.response.held_contacts import held_sliders
 from solver.response.solution import Solution
 from solver.results.told import Piece
 from solver.scene.bodies.body import Load

@@ -22,8 +22,8 @@ from scipy.optimize import brentq
 
 from solver.arrays import Real
 from solver.continuation.branches.observation import observed_balance
+from solver.response.worst_mean import WorstMeanSlopes
 from solver.scene.materials import haigh_of, utilisation_of
-from solver.sensitivity.gradient import Sensitivities
 from solver.sensitivity.nonsmooth import peak_gradient
 from solver.studies.margin_diagram import judged_rows, most_used
 from solver.studies.wear_life.course import Here, WearCourse
@@ -66,12 +66,12 @@ def _used(course: WearCourse, depths: Real, paths: Sequence[str] = ()) -> tuple[
     scene, conditions = course.wearing.at(depths), course.conditions
     if conditions.blocks is None:
         most = most_used(conditions.swept(scene))
-        return most.peak.value, peak_gradient(Sensitivities(most.branch.balance, paths), most.peak).gradient
+        return most.peak.value, peak_gradient(most.slopes(*paths), most.peak).gradient
     found = []
     for hertz, _ in conditions.blocks:
         balance, motion = conditions.at_frequency(scene, hertz)
         for row in judged_rows(scene):
-            seen = Sensitivities(observed_balance(balance, row, haigh_of(scene, row)), paths)
+            seen = WorstMeanSlopes(observed_balance(balance, row, haigh_of(scene, row)), paths)
             gradient = seen.gradient(motion.u, hertz)
             found.append((gradient.value, gradient.by_parameters))
     return max(found, key=lambda one: one[0])

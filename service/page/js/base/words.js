@@ -11,6 +11,8 @@ const FLAGS = {
   not_unique: "its mirror image is a response too, and the symmetric one is unstable",
   symmetric_unstable: "a half-wave symmetric response is unstable: another one, with a mean, is seen",
   travelling_wave_assumed: "the response is assumed to be the travelling wave: compare with every sector",
+  worst_mean: "where the mean depends on the history, a stress is judged by the worst mean that stuck contacts may hold",
+  mean_stress_open: "how large a mean stress stuck contacts hold is not known: margins are those of an unloaded start",
 };
 
 // The flags of a result, one of a newer version as it is, and its notes, without what its warnings say.
