@@ -252,8 +252,8 @@ def _search(search: RobustSearch, drawn: tuple[Scenario, ...], state: _State) ->
         if unknown is not None:
             raise UnknownScenarioError(unknown)
         status = _checked_status(search, state, status)
-        known = state.sides["robust"].known.relative <= WELL_KNOWN
-        if status is RobustStatus.OPTIMAL and (not known or state.progress.best.evaluation.open):
+        sure = state.sides["robust"].known.relative <= WELL_KNOWN
+        if status is RobustStatus.OPTIMAL and (not sure or state.progress.best.evaluation.open):
             return RobustStatus.NOT_KNOWN
     undamped = status is RobustStatus.NO_RESPONSE and state.nominal.status is DesignStatus.UNDAMPED
     return RobustStatus.UNDAMPED if undamped else status
