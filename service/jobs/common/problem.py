@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from optim.criteria.key import Name as Name
 from optim.criteria.key import Pair as Pair
-from optim.criteria.key import Ranges as Ranges
 from optim.problem.keys import OPTIONS, ROBUST, ProblemKeys
 from service.jobs.common.scenes import HarmonicRequest
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from optim.criteria.key import LARGEST as LARGEST
+from optim.criteria.key import LEAST as LEAST
 from optim.criteria.key import MAX_HARMONICS as MAX_HARMONICS
 from optim.criteria.key import FrequencyHz as FrequencyHz
 from optim.criteria.key import Harmonics as Harmonics
+from optim.criteria.key import NotNegative as NotNegative
 from optim.criteria.key import Number as Number
 from optim.criteria.key import ParameterPath as ParameterPath
 from optim.criteria.key import PositiveNumber as PositiveNumber

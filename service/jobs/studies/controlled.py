@@ -9,7 +9,7 @@ from pydantic import Field
 
 from optim.criteria.key import Name
 from service.jobs.common.results import Table, answered
-from service.jobs.common.scenes import HarmonicRequest, PositiveNumber
+from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, PositiveNumber
 from service.jobs.common.sizes import balance_issues
 from service.jobs.common.study_keys import band_issues
 from service.jobs.registry import Flag
@@ -44,10 +44,10 @@ class Controlled(Study, HarmonicRequest):
     amplitude: Annotated[PositiveNumber, Flag(metavar="A")] = Field(
         description="Amplitude of harmonic 1 that is held [m]."
     )
-    start: Annotated[PositiveNumber | None, Flag(metavar="F")] = Field(
+    start: Annotated[FrequencyHz | None, Flag(metavar="F")] = Field(
         default=None, alias="from", description="First frequency [Hz]; the scene's band if left out."
     )
-    stop: Annotated[PositiveNumber | None, Flag(metavar="F")] = Field(
+    stop: Annotated[FrequencyHz | None, Flag(metavar="F")] = Field(
         default=None, alias="to", description="Last frequency [Hz]."
     )
     dof: Annotated[Name | None, Flag(metavar="NAME")] = Field(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import BeforeValidator, Field
 
-from optim.criteria.key import Pair
+from optim.criteria.key import Pair, Share
 from optim.problem.keys import MAX_VARIABLES, VariableName
 from optim.problem.words import ScalingWord
 from service.jobs.common.results import KindResult, Table, answered
@@ -79,7 +79,7 @@ class Measured(Study, HarmonicRequest):
         max_length=MAX_VARIABLES,
         description="What was known before: path to [mean, standard deviation].",
     )
-    noise: Annotated[Annotated[float, Field(strict=True, gt=0.0, lt=1.0)] | None, Flag(metavar="R")] = Field(
+    noise: Annotated[Share | None, Flag(metavar="R")] = Field(
         default=None, description="Noise relative to the amplitude; found from the data if left out."
     )
     starts: Annotated[int, Field(strict=True, ge=1, le=1000), Flag(metavar="N")] = Field(

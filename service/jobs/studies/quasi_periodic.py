@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field, RootModel
 
 from optim.criteria.key import Name
 from service.jobs.common.results import answered
-from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, Number, check
+from service.jobs.common.scenes import LEAST, FrequencyHz, HarmonicRequest, Number, check
 from service.jobs.common.sizes import balance_issues
 from service.jobs.registry import Flag, Json
 from service.jobs.study import Answer, Study, Watch
@@ -78,7 +78,7 @@ class QuasiPeriodicStudy(Study, HarmonicRequest):
         default=90,
         description="Most turns of the faster frequency after which the motion is taken to repeat.",
     )
-    tolerance: Annotated[float, Field(strict=True, gt=0.0, le=0.1), Flag(metavar="E")] = Field(
+    tolerance: Annotated[float, Field(strict=True, ge=LEAST, le=0.1), Flag(metavar="E")] = Field(
         default=2e-3, description="Change by longer periods, relative, at which they are long enough."
     )
 
