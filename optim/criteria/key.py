@@ -102,7 +102,7 @@ MAX_HARMONICS = 200
 Harmonics = Annotated[int, Field(strict=True, ge=1, le=MAX_HARMONICS)]
 ParameterPath = Annotated[str, Field(max_length=210, pattern=r"^[A-Za-z0-9_@-]+(\.[A-Za-z0-9_@-]+)?$")]
 FrequencyHz = Annotated[float, Field(strict=True, ge=LEAST_HZ, le=MOST_HZ)]
-SpeedRpm = Annotated[float, Field(strict=True, ge=60.0 * LEAST_HZ, le=60.0 * MOST_HZ)]
+SpeedRpm = Annotated[float, Field(strict=True, ge=1e-7, le=60.0 * MOST_HZ)]
 Name = Annotated[str, Field(strict=True, min_length=1, max_length=200)]
 _Two = Field(min_length=2, max_length=2)
 _Some = Field(min_length=1, max_length=MAX_RANGES)

@@ -20,6 +20,8 @@ MOST_UNKNOWNS = 8_000
 """Of the balance: its matrix, of which a worker holds some, is then 0.5 GB."""
 MOST_STEPS = 100_000_000_000
 """Time steps × DOFs of a march: hours of one processor."""
+QUICK_DOFS = 500
+"""Of the whole disk: of so many it is quickly known how fast they move."""
 FEWEST_STEPS = 256
 """Of a period, where the solver chooses them."""
 MOST_MOTIONS = 40
@@ -176,6 +178,11 @@ def march_issues(
     key = of_periods if steps_per_period is None else "steps_per_period"
     words = "steps of a period × periods × DOFs"
     return [Issue((key,), f"`{key}`: {words} must be at most {MOST_STEPS}", steps, named=False)]
+
+
+def is_quick(scene: Scene) -> bool:
+    """Whether what its frequencies allow may be looked at before a job is taken."""
+    return whole_disk_dofs(scene) <= QUICK_DOFS
 
 
 def dofs_solved(scene: Scene) -> int:

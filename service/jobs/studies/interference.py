@@ -10,10 +10,12 @@ from pydantic import Field
 from optim.criteria.key import SpeedRpm
 from service.jobs.common.results import answered
 from service.jobs.common.scenes import FrequencyHz, check
-from service.jobs.common.sizes import memory_issues
+from service.jobs.common.sizes import is_quick, memory_issues
+from service.jobs.common.study_keys import of_keys
 from service.jobs.registry import Flag, Json
 from service.jobs.study import Study
 from solver.errors import Issue
+from solver.results.views import on_demand
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -64,7 +66,11 @@ class Interference(Study):
         """Return what is too large."""
         from solver.studies.mistuning import without_mistuning
 
-        return memory_issues(without_mistuning(scene), 1)
+        if (large := memory_issues(without_mistuning(scene), 1)) or not is_quick(scene):
+            return large
+        # How many orders reach the frequencies only these say.
+        drawn = partial(on_demand(self.FUNCTION), scene, **self.spec(scene))
+        return of_keys(check(drawn), self.own_keys())
 
     @classmethod
     def empty(cls, result: Json) -> str:

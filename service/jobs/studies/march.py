@@ -10,7 +10,7 @@ from pydantic import Field
 
 from service.jobs.common.results import Table, answered
 from service.jobs.common.scenes import FrequencyHz, check
-from service.jobs.common.sizes import march_issues
+from service.jobs.common.sizes import is_quick, march_issues
 from service.jobs.common.study_keys import of_keys
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
@@ -63,7 +63,7 @@ class March(Study):
 
         steps = partial(marched, scene, self.frequency_hz, self.steps_per_period)
         large = march_issues(scene, self.steps_per_period, self.max_periods)
-        return large or of_keys(check(steps), self.own_keys())
+        return large or (of_keys(check(steps), self.own_keys()) if is_quick(scene) else [])
 
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from service.jobs.common.results import answered
 from service.jobs.common.scenes import NotNegative, PositiveNumber, check
-from service.jobs.common.sizes import march_issues
+from service.jobs.common.sizes import is_quick, march_issues
 from service.jobs.common.study_keys import of_keys
 from service.jobs.registry import Flag
 from service.jobs.study import Study
@@ -93,4 +93,4 @@ class Transient(Study):
         key = "rate_hz_per_s" if self.ramp_seconds is None else "ramp_seconds"
         large = march_issues(scene, self.steps_per_period, math.ceil(periods), key)
         passable = partial(check_passage, scene, slowest, self.steps_per_period, from_rest=self.from_rest)
-        return large or of_keys(check(passable), self.own_keys())
+        return large or (of_keys(check(passable), self.own_keys()) if is_quick(scene) else [])

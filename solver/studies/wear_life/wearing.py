@@ -101,7 +101,9 @@ class Wearing:
         """Return the scene worn by `depths` (n,) [m], nothing below its least; or SettingError of a law."""
         contacts = list(self.scene.contacts)
         for loss in self.losses:
-            place, value = self.places[loss.contact], max(self.number(loss, depths), loss.least)
+            # A step that is tried and not taken may lead anywhere.
+            place = self.places[loss.contact]
+            value = min(max(self.number(loss, depths), loss.least), LARGEST)
             old = contacts[place]
             contacts[place] = changed(
                 old, old.changed_by(loss.key, value), loss.path, value, "must be what its law takes"
