@@ -18,7 +18,7 @@ from service.errors import InvalidRequestError, NotFoundError, UnreadableUploadE
 from service.jobs.common.scenes import UPLOAD, Place, named_files, with_named
 from service.jobs.strict_json import digest, encoded
 from service.settings.settings import Settings
-from service.uploads.inspection import contents, joined, look_at, resolved_structure
+from service.uploads.inspection import contents, look_at, resolved_structure
 from solver.errors import Issue
 
 PART = "part"
@@ -84,13 +84,12 @@ class Uploads:
         more = given.size - sum(part.size for part in ids.values())
         if more > 0 or not whole:
             self.storage.require(caller, more)
+        for part_id, part in ids.items():
+            self.repository.files.place(part, path.with_name(part_id))
         found: list[dict[str, Any]] = []
-        if whole:
-            for part_id, part in ids.items():
-                self.repository.files.place(part, path.with_name(part_id))
-            found, given.sha256 = joined(path, parts, given.size, self._seconds)
-        elif given.format != PART:
-            found = contents(path, self._seconds)
+        if given.format != PART:
+            found, known = contents(path, self._seconds, parts, given.size if whole else 0)
+            given.sha256 = known or given.sha256
         row, added = self.repository.add(path, given, None if given.format == PART else list(ids))
         for owner in {part.owner for part in whole}:
             self.storage.forget(owner)
@@ -99,12 +98,7 @@ class Uploads:
     def _parts(self, ids: Sequence[str], caller: Caller) -> list[Upload]:
         rows = []
         for at, upload_id in enumerate(ids):
-            try:
-                rows.append(self.get(upload_id, caller))
-            except NotFoundError as error:
-                raise InvalidRequestError.of(
-                    ("part", at), error.detail, named=False, source="query"
-                ) from error
+            rows.append(self._row("part", at, upload_id, caller, "query"))
             if rows[-1].format != PART:
                 wanted = f"must be an upload of the format {PART!r}"
                 raise InvalidRequestError.of(("part", at), wanted, rows[-1].format, source="query")
@@ -188,11 +182,11 @@ class Uploads:
                 tables["structure"] = with_named(tables["structure"], ids)
         return found
 
-    def _row(self, key: str, at: int, upload_id: str, caller: Caller) -> Upload:
+    def _row(self, key: str, at: int, upload_id: str, caller: Caller, source: str = "body") -> Upload:
         try:
             return self.get(upload_id, caller)
         except NotFoundError as error:
-            raise InvalidRequestError.of((key, at), error.detail, named=False) from error
+            raise InvalidRequestError.of((key, at), error.detail, named=False, source=source) from error
 
     def _rows(self, structure: Mapping[str, Any], caller: Caller) -> dict[Place, Upload]:
         """The uploads a structure names, by their places.

@@ -190,4 +190,4 @@ def test_an_archive_that_inflates_is_refused_at_once(tmp_path: Path) -> None:
         inspection.contents(file, 60.0)
     assert time.monotonic() - begun < 30.0
     np.savez_compressed(file, K=np.eye(100))
-    assert inspection.contents(file, 60.0)[0]["rows"] == 100
+    assert inspection.contents(file, 60.0)[0][0]["rows"] == 100

@@ -164,7 +164,7 @@ def test_the_time_to_read_files_grows_with_them(tmp_path: Path, monkeypatch: pyt
     with pytest.raises(UnreadableUploadError, match=r"raise STICKSLIP_INSPECTION_SECONDS .* --reduce"):
         inspection.contents(file, 0.001)
     monkeypatch.setattr("service.uploads.inspection._USUAL_BYTES", 1)
-    assert [one["rows"] for one in inspection.contents(file, 0.1)] == [12]
+    assert [one["rows"] for one in inspection.contents(file, 0.1)[0]] == [12]
 
 
 def test_what_does_not_fit_is_refused_with_pointers(shipped: httpx.Client, tmp_path: Path) -> None:
@@ -298,7 +298,7 @@ def test_a_reader_that_takes_too_long_or_dies_is_ended(
     with pytest.raises(UnreadableUploadError, match=r"longer than 0\.01 s"):
         inspection.contents(tmp_path / "M.npz", 0.01)
     monkeypatch.setattr(inspection, "_budget", inspection._Budget(inspection._LEAST_BYTES + 10**6))
-    assert inspection.contents(tmp_path / "M.npz", 30.0)[0]["rows"] == len(M), "its place is free again"
+    assert inspection.contents(tmp_path / "M.npz", 30.0)[0][0]["rows"] == len(M), "its place is free again"
     assert "damaged" in inspection._end(-signal.SIGSEGV, 1.0)
     assert "memory or time" in inspection._end(-signal.SIGKILL, 1.0)
     assert "longer than 1 s" in inspection._end(-signal.SIGXCPU, 1.0)

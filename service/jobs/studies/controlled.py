@@ -62,7 +62,8 @@ class Controlled(Study, HarmonicRequest):
         issues = band_issues(scene, self.start, self.stop)
         if self.dof is not None and self.dof not in scene.dofs:
             issues.append(Issue(("dof",), f"must be one of {', '.join(scene.dofs)}", self.dof))
-        if any(force.harmonic != 1 for force in scene.excitation):
+        forces = [force for force in scene.excitation if force.amplitude != 0.0]
+        if not forces or any(force.harmonic != 1 for force in forces):
             wanted = "must have an excitation of harmonic 1 alone: it holds the amplitude"
             issues.append(Issue(("scene",), wanted))
         return issues
