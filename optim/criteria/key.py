@@ -107,6 +107,7 @@ Name = Annotated[str, Field(strict=True, min_length=1, max_length=200)]
 _Two = Field(min_length=2, max_length=2)
 _Some = Field(min_length=1, max_length=MAX_RANGES)
 Pair = Annotated[list[Number], _Two]
+Ranges = Annotated[list[Pair], _Some]
 BandHz = Annotated[list[FrequencyHz], _Two]
 BandsHz = Annotated[list[BandHz], _Some]
 RangeRpm = Annotated[list[SpeedRpm], _Two]

@@ -39,7 +39,6 @@ def format_of(asked: str | None, name: str, content_type: str) -> str:
     InvalidRequestError
         If none of them says it, or no reader has the word.
     """
-    # Loaded here: a service that only lists does not need SciPy.
     from solver.matrices.readers import registry
 
     known = (*registry.words(), PART)

@@ -208,7 +208,6 @@ class MatricesRequest(AskedModel):
 @matrices.get("/formats")
 def formats(context: InContext) -> FormatsAnswer:
     """The formats that can be uploaded."""
-    # Loaded here: a service that only lists does not need SciPy.
     from solver.matrices.readers.registry import readers
 
     return FormatsAnswer(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from optim.criteria.key import Name as Name
 from optim.criteria.key import Pair as Pair
+from optim.criteria.key import Ranges as Ranges
 from optim.problem.keys import OPTIONS, ROBUST, ProblemKeys
 from service.jobs.common.scenes import HarmonicRequest
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
@@ -30,8 +31,6 @@ class ProblemRequest(ProblemKeys, Study, HarmonicRequest):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return everything wrong with the problem."""
-        # Loaded here, as below: it brings the compiled loops along, which a service that only lists does not
-        # need.
         from optim.problem.issues import problem_issues, reading_issues
 
         given = arguments(self)

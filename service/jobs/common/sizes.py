@@ -55,7 +55,6 @@ def memory_limited(most: int | None) -> Iterator[None]:
 
 def memory_issues(scene: Scene, harmonics: int, *, every_sector: bool = False) -> list[Issue]:
     """Refuse a response whose dense matrices take more memory than a job may, before any is made."""
-    # Loaded here, as below.
     from solver.studies.memory import dense_bytes
 
     needed = dense_bytes(scene, harmonics, every_sector=every_sector).total
@@ -131,7 +130,6 @@ def coefficients(scene: Scene, harmonics: int) -> int:
 
 
 def _sectors(scene: Scene) -> int:
-    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
     from solver.scene.cyclic.annulus import sectors_needed
 
     return sectors_needed(scene).sectors
@@ -166,7 +164,6 @@ def march_issues(
 
     `of_periods` is the key that says how many periods there are.
     """
-    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
     from solver.studies.memory import march_bytes
 
     if not _fits(needed := march_bytes(scene)):

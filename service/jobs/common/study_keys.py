@@ -39,7 +39,6 @@ _FIRST_TRIES = 23  # harmonics; with more unknowns than a few nobody adds any to
 
 def effects_issues(effects: str) -> list[Issue]:
     """Return what is wrong with the word of effects."""
-    # Loaded here, as below: the help of a command needs the keys alone.
     from solver.balance.simplifications import Effects
 
     return check(partial(Effects.read, effects), "effects")
@@ -78,7 +77,6 @@ class RangeRequest(HarmonicRequest):
 
 def range_issues(request: RangeRequest, scene: Scene) -> list[Issue]:
     """Everything wrong with the range for the scene."""
-    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
     from solver.continuation.parameter_scale import scale_of
 
     path = request.parameter

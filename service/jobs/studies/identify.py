@@ -98,7 +98,6 @@ class Measured(Study, HarmonicRequest):
 
     def read_issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the whole description, by the pointer of its field."""
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from optim.identification.reading import read_data
         from optim.identification.unknowns import read_unknowns
 

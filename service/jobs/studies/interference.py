@@ -57,7 +57,6 @@ class Interference(Study):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return why it is no disk, or a speed that cannot be."""
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.studies.interference import checked_speed
 
         return check(partial(checked_speed, scene, self.speed_rpm, self.orders))

@@ -43,7 +43,6 @@ def motions_of(found: solver.NonlinearMode) -> dict[str, Any]:
     imaginary parts of harmonic 1 of the degrees of freedom `dofs` over the amplitude [1/√kg]. Of more
     contacts or degrees of freedom than fit, the first are given.
     """
-    # Loaded here: the help of the command needs no numbers.
     import numpy as np
 
     count = found.amplitude.size
@@ -184,7 +183,6 @@ class Modes(Study, HarmonicRequest):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return which questions do not go together, and what is wrong with the mode."""
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.modes.limit_cycles import check_loads
         from solver.modes.nonlinear_mode import at_nodal_diameter, check_mode
 

@@ -85,7 +85,6 @@ class QuasiPeriodicStudy(Study, HarmonicRequest):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with frequencies, force and lengths."""
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.response.quasi_periodic import check as checked
         from solver.response.quasi_periodic import second_force
 
@@ -110,7 +109,6 @@ class QuasiPeriodicStudy(Study, HarmonicRequest):
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
         """Find one response, or a curve of them."""
         if "to_hz" in asked:
-            # Loaded here: the command's help needs no numbers.
             from solver import quasi_periodic_curve
 
             return Answer.of(quasi_periodic_curve(scene, **asked, **watch._asdict()))

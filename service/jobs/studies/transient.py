@@ -67,7 +67,6 @@ class Transient(Study):
 
     def runs(self, scene: Scene) -> list[tuple[Ramp, ...]]:
         """Return what is to be run through at each rate; SettingError names what is wrong."""
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.marching.transient import ramps_of
 
         keys = ("begin_hz", "end_hz", "rate_hz_per_s", "ramp_seconds", "ring_down_seconds")
@@ -84,7 +83,6 @@ class Transient(Study):
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
-        # Loaded here, as above.
         from solver.marching.transient import check_passage
 
         runs = self.runs(scene)

@@ -156,7 +156,6 @@ class Wear(Study, HarmonicRequest):
         )  # fmt: skip
 
     def _checked(self, scene: Scene) -> None:
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.studies.wear_life.life import course_of
         from solver.studies.wear_life.mission import Mission
         from solver.studies.wear_life.wearing import WearLaw

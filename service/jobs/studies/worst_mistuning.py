@@ -102,7 +102,6 @@ class WorstMistuningStudy(Study, HarmonicRequest):
         )
 
     def _checked(self, scene: Scene) -> None:
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.studies.blades import mistuned
         from solver.studies.patterns.intentional import IntentionalMistuning
         from solver.studies.patterns.linear_disk import Contacts, check_linear
