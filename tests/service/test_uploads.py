@@ -48,7 +48,7 @@ FILES: dict[str, bytes] = {
 def test_every_format_is_described(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path(name).write_bytes(FILES[name])
-    found = inspection._answer("describe", name)["found"]
+    found = inspection._answer("describe", [name])["found"][1]
     sizes = {(one["rows"], one["columns"]) for one in found}
     others = {"modes.npz": (3, 3), "M.dof": (len(M), 1)}
     assert sizes == {others.get(name, M.shape)}
@@ -265,7 +265,7 @@ def test_a_hostile_file_is_refused(case: str, tmp_path: Path, monkeypatch: pytes
     name, make = HOSTILE[case]
     monkeypatch.chdir(tmp_path)
     Path(name).write_bytes(make())
-    answer = inspection._answer("describe", name)
+    answer = inspection._answer("describe", [name])
     assert list(answer) == ["error"]
     assert "/tmp" not in answer["error"]
 

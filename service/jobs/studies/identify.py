@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from functools import cache
+from itertools import chain
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import BeforeValidator, Field
 
-from optim.criteria.key import Pair, Share
+from optim.criteria.key import LARGEST, Pair, Share
 from optim.problem.keys import MAX_VARIABLES, VariableName
 from optim.problem.words import ScalingWord
 from service.jobs.common.results import KindResult, Table, answered
@@ -37,6 +38,8 @@ def _small(value: object) -> object:
     lists = [item for table in value for item in table.values() if isinstance(item, list)]
     if sum(map(len, lists)) > MOST_NUMBERS:
         raise ValueError(f"must hold at most {MOST_NUMBERS} numbers")
+    if any(isinstance(one, int | float) and abs(one) > LARGEST for one in chain(*lists)):
+        raise ValueError(f"must hold numbers from {-LARGEST:g} to {LARGEST:g}")
     return value
 
 
