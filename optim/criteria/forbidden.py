@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key, Ranges
-from optim.criteria.key import Ranges as RangesInBodies
+from optim.criteria.key import BandsHz, RangesRpm
 from optim.criteria.peak import maxima
 
 if TYPE_CHECKING:
@@ -62,13 +62,13 @@ FORBIDDEN = CRITERION = Criterion(
     rows=_rows,
     keys=(
         Key(
-            name="forbidden_hz", annotation=RangesInBodies, form=Form.RANGES, flag="--forbidden",
+            name="forbidden_hz", annotation=BandsHz, form=Form.RANGES, flag="--forbidden",
             metavar="LO HI", example="520 560", examples=([[520, 560]],), needs_limit=True,
             help="Ranges [Hz] in which the amplitude stays below `limit`.",
             option_help="Frequencies [Hz] at which the amplitude stays below --limit; repeatable.",
         ),
         Key(
-            name="speeds_rpm", annotation=RangesInBodies, form=Form.RANGES, flag="--speeds", metavar="LO HI",
+            name="speeds_rpm", annotation=RangesRpm, form=Form.RANGES, flag="--speeds", metavar="LO HI",
             example="2900 3100", examples=([[2900, 3100]],), needs_limit=True,
             help="Ranges of running speed [1/min]; times the order of each case they are forbidden too.",
             option_help="Running speeds [1/min]: forbidden frequencies by the engine order; repeatable.",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from solver.wording import documented
 
@@ -82,18 +82,36 @@ class Key:
         return Option(self.form, self.flag, self.metavar, words, word=self.word, example=self.example)
 
 
-LARGEST = 1e15
+LEAST, LARGEST = 1e-30, 1e15
+"""Of what is not 0: with these, their squares and inverses floating-point numbers compute."""
+LEAST_HZ, MOST_HZ = 1e-9, 1e9
 MAX_RANGES = 200
 
-Number = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST)]
-PositiveNumber = Annotated[float, Field(strict=True, gt=0.0, le=LARGEST)]
+
+def _told_from_zero(number: float) -> float:
+    if 0.0 < abs(number) < LEAST:
+        raise ValueError(f"must be 0 or at least {LEAST:g}, up to the sign")
+    return number
+
+
+Number = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST), AfterValidator(_told_from_zero)]
+NotNegative = Annotated[Number, Field(ge=0.0)]
+Share = Annotated[float, Field(strict=True, ge=LEAST, lt=1.0)]
+PositiveNumber = Annotated[float, Field(strict=True, ge=LEAST, le=LARGEST)]
 MAX_HARMONICS = 200
 Harmonics = Annotated[int, Field(strict=True, ge=1, le=MAX_HARMONICS)]
 ParameterPath = Annotated[str, Field(max_length=210, pattern=r"^[A-Za-z0-9_@-]+(\.[A-Za-z0-9_@-]+)?$")]
-FrequencyHz = Annotated[float, Field(strict=True, gt=0.0, le=1e9)]
+FrequencyHz = Annotated[float, Field(strict=True, ge=LEAST_HZ, le=MOST_HZ)]
+SpeedRpm = Annotated[float, Field(strict=True, ge=1e-7, le=60.0 * MOST_HZ)]
 Name = Annotated[str, Field(strict=True, min_length=1, max_length=200)]
-Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
-Ranges = Annotated[list[Pair], Field(min_length=1, max_length=MAX_RANGES)]
+_Two = Field(min_length=2, max_length=2)
+_Some = Field(min_length=1, max_length=MAX_RANGES)
+Pair = Annotated[list[Number], _Two]
+Ranges = Annotated[list[Pair], _Some]
+BandHz = Annotated[list[FrequencyHz], _Two]
+BandsHz = Annotated[list[BandHz], _Some]
+RangeRpm = Annotated[list[SpeedRpm], _Two]
+RangesRpm = Annotated[list[RangeRpm], _Some]
 
 
 def number_or_table(unit: str, of: str) -> Any:
@@ -106,11 +124,15 @@ def number_or_table(unit: str, of: str) -> Any:
     """
 
     def checked(value: object) -> object:
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if number or (isinstance(value, dict) and 1 <= len(value) <= 1000):
+        few = value.values() if isinstance(value, dict) and 1 <= len(value) <= 1000 else [value]
+        # What is read looks at what is no number, and says where.
+        if all(LEAST <= one <= LARGEST for one in few if isinstance(one, int | float)) and (
+            isinstance(value, dict) or (isinstance(value, int | float) and not isinstance(value, bool))
+        ):
             return value
-        raise ValueError(f"must be a number > 0 [{unit}], or a table of {of} with one each")
+        bounds = f"from {LEAST:g} to {LARGEST:g}"
+        raise ValueError(f"must be a number {bounds} [{unit}], or a table of {of} with one each")
 
-    one = {"type": "number", "exclusiveMinimum": 0}
+    one = {"type": "number", "minimum": LEAST, "maximum": LARGEST}
     schema = {"anyOf": [one, {"type": "object", "additionalProperties": one}]}
     return Annotated[Any, BeforeValidator(checked), WithJsonSchema(schema)]

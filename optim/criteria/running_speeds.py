@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 from pydantic import Field
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key, Ranges
-from optim.criteria.key import Pair, PositiveNumber
+from optim.criteria.key import PositiveNumber, RangeRpm, SpeedRpm
 from optim.criteria.peak import maxima
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ RUNNING = CRITERION = Criterion(
     keys=(
         Key(
             name=_SPEEDS,
-            annotation=Annotated[list[PositiveNumber | Pair], Field(min_length=1, max_length=200)],
+            annotation=Annotated[list[SpeedRpm | RangeRpm], Field(min_length=1, max_length=200)],
             form=Form.RANGES, flag="--running", metavar="LO HI", example="2950 3050",
             examples=([[2950, 3050]], [3000]),
             help="Speeds and ranges of speed [1/min] at which the machine runs.",

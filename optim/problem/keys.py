@@ -16,6 +16,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSche
 
 from optim.criteria.key import (
     LARGEST,
+    LEAST,
+    BandHz,
     Form,
     Harmonics,
     Key,
@@ -25,6 +27,7 @@ from optim.criteria.key import (
     Pair,
     ParameterPath,
     PositiveNumber,
+    Share,
 )
 from optim.criteria.registry import criteria, limit_keys, weight_words
 from optim.problem.words import AimWord, MethodWord, ScalingWord
@@ -131,7 +134,7 @@ class CaseRequest(BaseModel):
         max_length=1000,
         description="Values of this case alone, parameter path to value; no variable.",
     )
-    band: Pair | None = Field(default=None, description="Frequencies [low, high] [Hz]; the scene's band.")
+    band: BandHz | None = Field(default=None, description="Frequencies [low, high] [Hz]; the scene's band.")
     observe: Observed | None = Field(default=None, description="DOF whose amplitude counts, or several.")
     engine_order: Annotated[int, Field(strict=True, ge=0, le=10_000)] | None = Field(
         default=None, description="Engine order of every excitation; cyclic scenes only."
@@ -221,7 +224,7 @@ class NominalAndRobustKeys(ProblemKeys):
         Option(Form.WHOLE_NUMBER, "--basins", "N", help=f"Local optima looked for; {BASINS}."),
     ] = Field(default=None, description=f"How many local optima are looked for; {BASINS}.")
     tolerance: Annotated[
-        Annotated[float, Field(strict=True, gt=0.0, le=1.0)] | None,
+        Annotated[float, Field(strict=True, ge=LEAST, le=1.0)] | None,
         Option(
             Form.NUMBER, "--tolerance", "E",
             help=f"Relative error of the peak up to which a performance curve suffices; {TOLERANCE}.",
@@ -246,7 +249,7 @@ class NominalAndRobustKeys(ProblemKeys):
     aim: AimWord | None = Field(
         default=None, description="What is minimised over the uncertainty; worst-case."
     )
-    quantile: Annotated[float, Field(strict=True, gt=0.0, lt=1.0)] | None = Field(
+    quantile: Share | None = Field(
         default=None, description=f"Share of the samples that the aim `quantile` minimises; {QUANTILE}."
     )
     samples: Annotated[int, Field(strict=True, ge=FEWEST_SAMPLES, le=10_000)] | None = Field(

@@ -11,7 +11,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Callable, Collection, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from datetime import datetime, timedelta
 from functools import partial
 from itertools import count
@@ -26,6 +26,8 @@ from service.db.models import Upload, UploadPiece
 from service.errors import DatabaseAwayError, NotFoundError
 
 PIECE_BYTES = 1 << 20
+WORK = "stickslip-work-"
+"""Begins the names of folders that `UploadFiles.work` makes."""
 _LEFT = timedelta(days=1)
 """Longer than anything takes to arrive and to be read."""
 
@@ -62,7 +64,7 @@ class UploadFiles:
         try:
             if self._folder is not None:
                 self._folder.mkdir(mode=0o700, exist_ok=True)
-            with tempfile.TemporaryDirectory(prefix="work-", dir=self._folder) as folder:
+            with tempfile.TemporaryDirectory(prefix=WORK, dir=self._folder) as folder:
                 yield Path(folder)
         except OSError as error:
             if error.errno not in (errno.ENOSPC, errno.EDQUOT):
@@ -125,6 +127,11 @@ class UploadFiles:
 
     def sweep(self, now: datetime) -> None:
         """Delete what a crash left: it is old, and no row names it."""
+        before = (now - _LEFT).timestamp()
+        for path in (self._folder or Path(tempfile.gettempdir())).glob(f"{WORK}*"):
+            with suppress(FileNotFoundError):  # it ends at this moment
+                if path.stat().st_mtime < before:
+                    shutil.rmtree(path, ignore_errors=True)
         if self._folder is None:
             left = delete(UploadPiece).where(
                 UploadPiece.upload_id < earliest_id(now - _LEFT),
@@ -133,12 +140,9 @@ class UploadFiles:
             with self._writing() as connection:
                 connection.execute(left)
         elif self._folder.exists():
-            before = (now - _LEFT).timestamp()
             old = [path for path in self._folder.iterdir() if path.stat().st_mtime < before]
             with self._reading() as connection:
                 named = set(connection.execute(select(Upload.id)).scalars()) if old else set()
             for path in old:
-                if path.is_dir():
-                    shutil.rmtree(path, ignore_errors=True)
-                elif path.name not in named:
+                if path.name not in named and not path.is_dir():
                     path.unlink(missing_ok=True)

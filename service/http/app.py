@@ -105,11 +105,11 @@ def _by_link(scope: MutableMapping[str, Any]) -> bool:
 
 
 _ROUTERS = (
+    page.docs, page.router,  # the first are found fastest
     jobs.router, forms.kinds, forms.laws, events.router, stored.designs, stored.results,
     stored.sweeps, scenes.texts,
     forms.templates, scenes.router, uploads.router, uploads.matrices, uploads.measurements, scenes.plans,
     scenes.previews, runs.projects, runs.reports, run_list.router, runs.runs, runs.shares, metrics.router,
-    page.docs, page.router,
 )  # fmt: skip
 
 

@@ -67,7 +67,7 @@ class InPieces:
             try:
                 view = memoryview(body)
                 for begin in range(0, len(body), _PIECE):
-                    piece = bytes(view[begin : begin + _PIECE])
+                    piece = view[begin : begin + _PIECE]  # copied once, by the server
                     more = begin + _PIECE < len(body) or message.get("more_body", False)
                     connection.sent += len(piece)
                     await send({"type": message["type"], "body": piece, "more_body": more})

@@ -28,7 +28,6 @@ from service.jobs.registry import Registry
 from service.queue.core import Service
 from service.settings import logs
 from service.settings.settings import Settings
-from service.uploads.uploads import scratch_folder
 
 log = logging.getLogger("stickslip.service")
 
@@ -79,7 +78,7 @@ def serve(settings: Settings, registry: Registry | None = None) -> None:
             _end_by_force_after(settings.exit_seconds)
 
         later = threading.Thread(target=_begin_the_rest, args=(app,), daemon=True)
-        with _signals(stop), scratch_folder():
+        with _signals(stop):
             later.start()
             server.run(sockets=[listener])
     finally:

@@ -228,7 +228,6 @@ class StoredArray:
     @classmethod
     def of(cls, array: NDArray[Any]) -> Self:
         """Return an array of numbers as bytes; one of objects is an error of the program (ValueError)."""
-        # Loaded here, as below: who lists what is stored needs no NumPy.
         import numpy as np
 
         buffer = io.BytesIO()

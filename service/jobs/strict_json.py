@@ -249,6 +249,7 @@ def finite(value: object) -> object:
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
 _SHOWN = 80  # characters of what was given
+_WRITTEN_OUT = 1e-3  # the least bound whose zeros are written
 _MESSAGES = {
     "extra_forbidden": "is not a known key",
     "missing": "is missing",
@@ -290,6 +291,8 @@ def _issue(error: Mapping[str, Any]) -> Issue:
         return _unknown_tag(error, location)
     if kind == "value_error":
         wanted = str(error["ctx"]["error"])
+    elif kind == "greater_than_equal" and 0.0 < error["ctx"]["ge"] < _WRITTEN_OUT:
+        wanted = f"must be at least {error['ctx']['ge']:g}"
     else:
         _, _, should = str(error["msg"]).partition(" should ")
         wanted = _MESSAGES.get(kind) or (f"must {should}" if should else str(error["msg"]))

@@ -3,6 +3,9 @@
 From one class follow the body of a request with its schema and its refusals, the kind of job, the spec that a
 worker is given, the command of its name and ``submit``, and the row in the documentation. The keys have the
 names of the arguments of the function that computes.
+
+Here and elsewhere in the service, what brings SciPy or the compiled loops of the solver along is imported
+where it is used: the help of a command, and a service that only lists, do not need them.
 """
 
 from __future__ import annotations

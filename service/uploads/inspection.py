@@ -41,11 +41,15 @@ _TOO_LONG = (
     "reading it takes longer than {:g} s: raise STICKSLIP_INSPECTION_SECONDS (of each 16 MiB), or reduce "
     "the model first, stickslip import FILES --reduce"
 )
-_DESCRIBE, _JOIN, _RESOLVE, _LOOK = "describe", "join", "resolve", "look"
+_DESCRIBE, _RESOLVE, _LOOK = "describe", "resolve", "look"
 
 
-def contents(file: Path, seconds: float) -> list[dict[str, Any]]:
+def contents(
+    file: Path, seconds: float, parts: Sequence[str] = (), size: int = 0
+) -> tuple[list[dict[str, Any]], str | None]:
     """The matrices, modes or nodes in a file: name, rows, columns and entries of each.
+
+    It is put together first of parts beside it, if there are some, `size` bytes in all; its SHA-256 then.
 
     Raises
     ------
@@ -53,28 +57,13 @@ def contents(file: Path, seconds: float) -> list[dict[str, Any]]:
         If there are none, the file is damaged, or reading it takes too much.
     QueueFullError
         If too many are being read.
-    """
-    found: list[dict[str, Any]] = _ask(_DESCRIBE, file.parent, file.name, seconds, 1024**2)
-    return found
-
-
-def joined(
-    file: Path, parts: Sequence[str], size: int, seconds: float
-) -> tuple[list[dict[str, Any]], str]:
-    """Put a file together of parts beside it; `contents` of it, and its SHA-256.
-
-    Raises
-    ------
-    UnreadableUploadError, QueueFullError
-        As `contents`.
     OSError
         If there is no room for so many bytes.
     """
     if shutil.disk_usage(file.parent).free < size:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-    asked = {"name": file.name, "parts": list(parts)}
-    found: dict[str, Any] = _ask(_JOIN, file.parent, asked, seconds, 1024**2, writes=size)
-    return found["contents"], found["sha256"]
+    sha256, found = _ask(_DESCRIBE, file.parent, [file.name, *parts], seconds, 1024**2, writes=size)
+    return found, sha256
 
 
 def resolved_structure(
@@ -223,7 +212,7 @@ def _answer(task: str, argument: Any) -> dict[str, Any]:
     from solver.matrices.files import MatrixFileError
 
     tasks: dict[str, Callable[[Any], Any]] = {
-        _DESCRIBE: _describe, _JOIN: _join, _RESOLVE: _resolve, _LOOK: _look,
+        _DESCRIBE: lambda names: (_join(*names), _describe(names[0])), _RESOLVE: _resolve, _LOOK: _look,
     }  # fmt: skip
     try:
         return {"found": tasks[task](argument)}
@@ -266,15 +255,17 @@ def _describe(name: str) -> list[dict[str, Any]]:
     return found
 
 
-def _join(asked: dict[str, Any]) -> dict[str, Any]:
+def _join(name: str, *parts: str) -> str | None:
+    if not parts:
+        return None
     known = hashlib.sha256()
-    with Path(asked["name"]).open("wb") as whole:
-        for part in asked["parts"]:
+    with Path(name).open("wb") as whole:
+        for part in parts:
             with Path(part).open("rb") as file:
                 for piece in iter(partial(file.read, _PIECE), b""):
                     whole.write(piece)
                     known.update(piece)
-    return {"contents": _describe(asked["name"]), "sha256": known.hexdigest()}
+    return known.hexdigest()
 
 
 def _refuse_inflating(file: Path) -> None:

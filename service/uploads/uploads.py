@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
-import shutil
-import sys
-import tempfile
 import threading
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from multiprocessing.util import Finalize
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from service.auth.allowances import Storage
 from service.auth.callers import KEYLESS, Caller
@@ -24,7 +18,7 @@ from service.errors import InvalidRequestError, NotFoundError, UnreadableUploadE
 from service.jobs.common.scenes import UPLOAD, Place, named_files, with_named
 from service.jobs.strict_json import digest, encoded
 from service.settings.settings import Settings
-from service.uploads.inspection import contents, joined, look_at, resolved_structure
+from service.uploads.inspection import contents, look_at, resolved_structure
 from solver.errors import Issue
 
 PART = "part"
@@ -37,19 +31,6 @@ _REDUCE = (
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Arrived:
-    """A file that came in and was not looked at yet."""
-
-    path: Path
-    name: str
-    format: str
-    size: int
-    sha256: str
-    parts: tuple[str, ...] = ()
-    """Uploads of the format `part`, which hold the file: there is nothing at `path` yet."""
-
-
 def format_of(asked: str | None, name: str, content_type: str) -> str:
     """The word of the format that was asked for, that of the ending of the name, or of the content type.
 
@@ -58,7 +39,6 @@ def format_of(asked: str | None, name: str, content_type: str) -> str:
     InvalidRequestError
         If none of them says it, or no reader has the word.
     """
-    # Loaded here: a service that only lists does not need SciPy.
     from solver.matrices.readers import registry
 
     known = (*registry.words(), PART)
@@ -79,8 +59,12 @@ class Uploads:
         self._lock = threading.Lock()
         self._resolved: OrderedDict[str, str] = OrderedDict()
 
-    def add(self, arrived: Arrived, caller: Caller = KEYLESS) -> tuple[Upload, list[dict[str, Any]], bool]:
+    def add(
+        self, path: Path, given: Upload, parts: Sequence[str] = (), caller: Caller = KEYLESS
+    ) -> tuple[Upload, list[dict[str, Any]], bool]:
         """Look at a file and store it; what it holds, and whether it is new to its owner.
+
+        `given` says what came; of a file in `parts` there is nothing at `path` yet.
 
         Raises
         ------
@@ -91,38 +75,29 @@ class Uploads:
         InvalidRequestError
             If a part is not there, or is none.
         """
-        parts = self._parts(arrived.parts, caller)
-        ids = {part.id: part for part in parts}
-        size = sum(part.size for part in parts) if parts else arrived.size
-        more = size - sum(part.size for part in ids.values())
-        if more > 0 or not parts:
+        given.owner = caller.owner
+        whole = self._parts(parts, caller)
+        ids = {part.id: part for part in whole}
+        if whole:
+            given.size = sum(part.size for part in whole)
+        more = given.size - sum(part.size for part in ids.values())
+        if more > 0 or not whole:
             self.storage.require(caller, more)
+        for part_id, part in ids.items():
+            self.repository.files.place(part, path.with_name(part_id))
         found: list[dict[str, Any]] = []
-        sha256 = arrived.sha256
-        if parts:
-            for part_id, part in ids.items():
-                self.repository.files.place(part, arrived.path.with_name(part_id))
-            found, sha256 = joined(arrived.path, [part.id for part in parts], size, self._seconds)
-        elif arrived.format != PART:
-            found = contents(arrived.path, self._seconds)
-        given = Upload(
-            owner=caller.owner, name=arrived.name, format=arrived.format, size=size, sha256=sha256
-        )
-        whole = None if arrived.format == PART else list(ids)
-        row, added = self.repository.add(arrived.path, given, whole)
-        for owner in {part.owner for part in parts}:
+        if given.format != PART:
+            found, known = contents(path, self._seconds, parts, given.size if whole else 0)
+            given.sha256 = known or given.sha256
+        row, added = self.repository.add(path, given, None if given.format == PART else list(ids))
+        for owner in {part.owner for part in whole}:
             self.storage.forget(owner)
         return row, found, added
 
-    def _parts(self, ids: tuple[str, ...], caller: Caller) -> list[Upload]:
+    def _parts(self, ids: Sequence[str], caller: Caller) -> list[Upload]:
         rows = []
         for at, upload_id in enumerate(ids):
-            try:
-                rows.append(self.get(upload_id, caller))
-            except NotFoundError as error:
-                raise InvalidRequestError.of(
-                    ("part", at), error.detail, named=False, source="query"
-                ) from error
+            rows.append(self._row("part", at, upload_id, caller, "query"))
             if rows[-1].format != PART:
                 wanted = f"must be an upload of the format {PART!r}"
                 raise InvalidRequestError.of(("part", at), wanted, rows[-1].format, source="query")
@@ -206,11 +181,11 @@ class Uploads:
                 tables["structure"] = with_named(tables["structure"], ids)
         return found
 
-    def _row(self, key: str, at: int, upload_id: str, caller: Caller) -> Upload:
+    def _row(self, key: str, at: int, upload_id: str, caller: Caller, source: str = "body") -> Upload:
         try:
             return self.get(upload_id, caller)
         except NotFoundError as error:
-            raise InvalidRequestError.of((key, at), error.detail, named=False) from error
+            raise InvalidRequestError.of((key, at), error.detail, named=False, source=source) from error
 
     def _rows(self, structure: Mapping[str, Any], caller: Caller) -> dict[Place, Upload]:
         """The uploads a structure names, by their places.
@@ -316,74 +291,3 @@ def _engine_orders(body: Mapping[str, object]) -> list[int]:
 
 def _is_reference(value: object) -> bool:
     return isinstance(value, str) and value.startswith(UPLOAD)
-
-
-PREFIX = "stickslip-service-"
-_LOCK = "lock"
-_OF_MULTIPROCESSING = "pymp-"
-_AFTER_MULTIPROCESSING = -200  # it removes its own folder at -100
-
-
-@contextmanager
-def scratch_folder() -> Iterator[Path]:
-    """Inside the block every temporary file of this process is in a folder that is removed at its end.
-
-    Where multiprocessing has made its own folder in it, which it looks for once more when the process ends,
-    that one stays until then.
-    """
-    remove_abandoned()
-    before, variable = tempfile.tempdir, os.environ.get("TMPDIR")
-    folder = Path(tempfile.mkdtemp(prefix=PREFIX))
-    lock = (folder / _LOCK).open("w")
-    _try_lock(lock.fileno())
-    # Processes that read uploads for this one find it in the environment.
-    tempfile.tempdir = os.environ["TMPDIR"] = str(folder)
-    try:
-        yield folder
-    finally:
-        tempfile.tempdir = before
-        if variable is None:
-            del os.environ["TMPDIR"]
-        else:
-            os.environ["TMPDIR"] = variable
-        kept = [part for part in folder.iterdir() if part.name.startswith(_OF_MULTIPROCESSING)]
-        for part in set(folder.iterdir()) - {*kept, folder / _LOCK}:
-            shutil.rmtree(part, ignore_errors=True) if part.is_dir() else part.unlink(missing_ok=True)
-        if kept:
-            Finalize(None, _remove, args=(folder, lock), exitpriority=_AFTER_MULTIPROCESSING)
-        else:
-            _remove(folder, lock)
-
-
-def _remove(folder: Path, lock: TextIO) -> None:
-    """Remove a folder whose lock this process holds."""
-    shutil.rmtree(folder, ignore_errors=True)
-    lock.close()
-
-
-def remove_abandoned() -> list[Path]:
-    """Remove the folders of services that were killed; which they were."""
-    gone = []
-    for folder in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
-        try:
-            with (folder / _LOCK).open("r") as lock:
-                if not _try_lock(lock.fileno()):
-                    continue
-        except OSError:
-            continue  # another's, or made at this moment
-        shutil.rmtree(folder, ignore_errors=True)
-        gone.append(folder)
-    return gone
-
-
-def _try_lock(file: int) -> bool:
-    """Lock an open file until it is closed; False if somebody else has it locked."""
-    if sys.platform == "win32":
-        return False
-    import fcntl
-
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True

@@ -27,6 +27,7 @@ from solver.marching.result import MarchResult, MarchStatus, describe, of_harmon
 from solver.marching.start import MarchStart, state_at
 from solver.results.watch import shows_progress
 from solver.scene.cyclic.annulus import annulus
+from solver.scene.parameter_paths import check_frequency
 from solver.scene.scene import Excitation, Scene
 
 FloatArray = NDArray[np.float64]
@@ -130,27 +131,40 @@ def march(
     _check(frequency_hz, tolerance, max_periods)
     if start is not None and tractions is not None:
         raise SettingError("tractions", dict(tractions), "must be those of `start` where that is given")
-    scene = whole(scene.at_frequency(frequency_hz))
-    omega = 2.0 * math.pi * frequency_hz
-    equations = equations_of_motion(scene, omega)
-    rigid = scene.rigid_contact is not None
-    system = equations.system
-    if rigid:
-        system = system._replace(kt=_finite(system.kt), kn=_finite(system.kn))
-    steps = steps_for(system, scene.forces, steps_per_period, moreau.STEPS if rigid else 0)
+    scene, equations, steps = marched(scene, frequency_hz, steps_per_period)
     plan = _Plan(
         system=equations.system, dof=equations.observed, tolerance=tolerance, max_periods=max_periods,
         on_progress=on_progress, should_stop=should_stop,
     )  # fmt: skip
     names = row_names(scene)
-    begins = state_at(equations, start or MarchStart(tractions=tractions or {}), names, omega)
-    if rigid:
+    first = start or MarchStart(tractions=tractions or {})
+    begins = state_at(equations, first, names, equations.system.omega)
+    if scene.rigid_contact is not None:
         found = _twice_rigid(plan, equations, begins, steps, names, frequency_hz)
     else:
         found = _twice(plan, begins, steps, names, frequency_hz)
     if scene.observe.harmonic is not None:
         found = of_harmonic(found, scene.observe.harmonic)
     return replace(found, seconds=time.perf_counter() - begin)
+
+
+def marched(
+    scene: Scene, frequency_hz: float, steps_per_period: int | None
+) -> tuple[Scene, MarchEquations, int]:
+    """Return a scene as it is marched at a frequency [Hz], its equations, and the steps of a period.
+
+    Raises
+    ------
+    SettingError
+        A scene that cannot be marched; a frequency, or steps, at which it cannot.
+    """
+    scene = whole(scene.at_frequency(frequency_hz))
+    equations = equations_of_motion(scene, 2.0 * math.pi * frequency_hz)
+    system, rigid = equations.system, scene.rigid_contact is not None
+    if rigid:
+        system = system._replace(kt=_finite(system.kt), kn=_finite(system.kn))
+    steps = steps_for(system, scene.forces, steps_per_period, moreau.STEPS if rigid else 0)
+    return scene, equations, steps
 
 
 def whole(scene: Scene) -> Scene:
@@ -234,8 +248,7 @@ def _finite(stiffnesses: FloatArray) -> FloatArray:
 
 
 def _check(frequency_hz: float, tolerance: float, max_periods: int) -> None:
-    if not (isinstance(frequency_hz, Real) and 0.0 < frequency_hz <= 1e9):
-        raise SettingError("frequency_hz", frequency_hz, "must be a number > 0 and <= 1e9 [Hz]")
+    check_frequency("frequency_hz", frequency_hz)
     if not (isinstance(tolerance, Real) and 1e-13 <= tolerance <= 1e-2):
         raise SettingError("tolerance", tolerance, "must be a number from 1e-13 to 1e-2")
     if not (isinstance(max_periods, Integral) and 1 <= max_periods <= 100_000_000):

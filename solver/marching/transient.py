@@ -28,6 +28,7 @@ from solver.marching.result import MarchStatus, turning_points
 from solver.marching.start import MarchStart, state_at
 from solver.marching.transient_result import TransientResult, TransientStatus
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
+from solver.scene.parameter_paths import check_frequency
 from solver.scene.scene import Scene
 
 MOST_WINDOWS = 2000  # of the envelope, over the whole run
@@ -348,10 +349,7 @@ def _start(
         begins = state_at(first, start or MarchStart(), row_names(scene), run.omega, base)
         return begins, TransientStatus.FINISHED
     hertz = run.ramps[0].begin_hz
-    if hertz == 0.0:
-        raise SettingError("begin_hz", hertz, "must be > 0, or the run begin from rest (`from_rest`)")
-    scene = whole(run.scene.at_frequency(hertz))
-    equations = in_modes(equations_of_motion(scene, 2.0 * math.pi * hertz))
+    scene, equations = _at_first(run)
     state, status = settled_state(scene, equations, hertz, SETTLED, should_stop, turn=run.turn)
     if status is MarchStatus.STOPPED:
         return None, TransientStatus.STOPPED
@@ -360,6 +358,33 @@ def _start(
     state.v[:] *= 2.0 * math.pi * hertz / run.omega
     moved_to(state, equations, run.equations[0])
     return state, TransientStatus.FINISHED
+
+
+def _at_first(run: _Passage) -> tuple[Scene, MarchEquations]:
+    """Return the scene at the first frequency and its equations, where it can be marched there."""
+    hertz = run.ramps[0].begin_hz
+    rest = "or the run begin from rest (`from_rest`)"
+    if hertz == 0.0:
+        raise SettingError("begin_hz", hertz, f"must be > 0, {rest}")
+    check_frequency("begin_hz", hertz)
+    scene = whole(run.scene.at_frequency(hertz))
+    equations = in_modes(equations_of_motion(scene, 2.0 * math.pi * hertz))
+    try:
+        steps_for(equations.system, scene.forces, None, turn=run.turn)
+    except SettingError as error:
+        wanted = f"must need fewer steps than {error.value} a period, {rest}"
+        raise SettingError("begin_hz", hertz, wanted) from error
+    return scene, equations
+
+
+def check_passage(
+    scene: Scene, ramps: tuple[Ramp, ...], steps_per_period: int | None, *, from_rest: bool
+) -> None:
+    """Raise SettingError where `transient` would for the steps of a run."""
+    run = _Passage(scene, ramps, modal=True)
+    run.steps(steps_per_period)
+    if not from_rest:
+        _at_first(run)
 
 
 def _result(

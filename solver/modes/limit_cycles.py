@@ -159,6 +159,13 @@ class LimitCycles(Piece):
         return asked | self._json()
 
 
+def check_loads(scene: Scene) -> None:
+    """Raise SettingError if a load of a scene varies with a phase of its own: no cycle repeats then."""
+    names = [one.name for one in scene.contacts if one.load is not None and one.load.orders]
+    if names:
+        raise SettingError("N1", names, "must be 0: a limit cycle has no phase that a load could follow")
+
+
 def limit_cycles(
     found: NonlinearMode, aero_damping: float = 0.0, *, stability: bool | None = None,
     mode_alone: bool = False,
@@ -183,10 +190,8 @@ def limit_cycles(
     """
     if isinstance(aero_damping, bool) or not math.isfinite(aero_damping):
         raise SettingError("aero_damping", aero_damping, "must be a damping ratio, below 0 if it feeds")
+    check_loads(found.scene)
     problem = pose(found.scene, found.mode, None, found.n_harmonics, whole=found.whole_matrices)
-    if not problem.turns:
-        names = [c.name for c in found.scene.contacts if c.load is not None and c.load.orders]
-        raise SettingError("N1", names, "must be 0: a limit cycle has no phase that a load could follow")
     missing = stability_left_out(found.scene, stability)
     curve, ended = points_of(problem.equations, found), found.reached
     if mode_alone:

@@ -268,7 +268,7 @@ def test_a_bad_deck_is_refused(case: str, tmp_path: Path, monkeypatch: pytest.Mo
     data, wanted = BAD_DECKS[case]
     monkeypatch.chdir(tmp_path)
     Path("deck.inp").write_bytes(data)
-    assert wanted in inspection._answer("describe", "deck.inp")["error"]
+    assert wanted in inspection._answer("describe", ["deck.inp"])["error"]
 
 
 BAD_SECTORS = {
@@ -290,8 +290,8 @@ def test_a_bad_reduced_sector_is_refused(case: str, tmp_path: Path, monkeypatch:
     given = arrays if case == "no matrices" else {**whole, **arrays}
     Path("reduced.npz").write_bytes(npz(**given))
     Path("good.npz").write_bytes(npz(**whole))
-    assert inspection._answer("describe", "good.npz")["found"][0]["rows"] == 2
-    error = inspection._answer("describe", "reduced.npz")["error"]
+    assert inspection._answer("describe", ["good.npz"])["found"][1][0]["rows"] == 2
+    error = inspection._answer("describe", ["reduced.npz"])["error"]
     assert wanted in error
     Path("reduced.npz").write_bytes(npz(**given)[:-30])
     with pytest.raises(solver.SceneError, match="is no reduced sector"):

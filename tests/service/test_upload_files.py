@@ -23,7 +23,7 @@ from service.db.engine import Database, backup, is_sqlite, migrating
 from service.db.models import Upload, UploadPiece
 from service.db.repositories import UploadRepository
 from service.db.repositories.integrity import check
-from service.db.upload_files import PIECE_BYTES
+from service.db.upload_files import PIECE_BYTES, WORK
 from service.errors import DatabaseAwayError, UnreadableUploadError
 from service.uploads import inspection
 
@@ -94,7 +94,7 @@ def test_a_crash_leaves_too_much_and_that_is_swept(database: Database) -> None:
     uploads.files.sweep(utc_now() + timedelta(hours=25))
     assert kept(database) == {row.id}
     if is_sqlite(database.url):
-        abandoned = files(database) / "work-1"
+        abandoned = files(database) / f"{WORK}1"
         abandoned.mkdir()
         (abandoned / "K.npz").write_bytes(b"x")
         os.utime(abandoned, (time.time() - 1e5,) * 2)
@@ -190,4 +190,4 @@ def test_an_archive_that_inflates_is_refused_at_once(tmp_path: Path) -> None:
         inspection.contents(file, 60.0)
     assert time.monotonic() - begun < 30.0
     np.savez_compressed(file, K=np.eye(100))
-    assert inspection.contents(file, 60.0)[0]["rows"] == 100
+    assert inspection.contents(file, 60.0)[0][0]["rows"] == 100

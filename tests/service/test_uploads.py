@@ -48,7 +48,7 @@ FILES: dict[str, bytes] = {
 def test_every_format_is_described(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path(name).write_bytes(FILES[name])
-    found = inspection._answer("describe", name)["found"]
+    found = inspection._answer("describe", [name])["found"][1]
     sizes = {(one["rows"], one["columns"]) for one in found}
     others = {"modes.npz": (3, 3), "M.dof": (len(M), 1)}
     assert sizes == {others.get(name, M.shape)}
@@ -164,7 +164,7 @@ def test_the_time_to_read_files_grows_with_them(tmp_path: Path, monkeypatch: pyt
     with pytest.raises(UnreadableUploadError, match=r"raise STICKSLIP_INSPECTION_SECONDS .* --reduce"):
         inspection.contents(file, 0.001)
     monkeypatch.setattr("service.uploads.inspection._USUAL_BYTES", 1)
-    assert [one["rows"] for one in inspection.contents(file, 0.1)] == [12]
+    assert [one["rows"] for one in inspection.contents(file, 0.1)[0]] == [12]
 
 
 def test_what_does_not_fit_is_refused_with_pointers(shipped: httpx.Client, tmp_path: Path) -> None:
@@ -265,7 +265,7 @@ def test_a_hostile_file_is_refused(case: str, tmp_path: Path, monkeypatch: pytes
     name, make = HOSTILE[case]
     monkeypatch.chdir(tmp_path)
     Path(name).write_bytes(make())
-    answer = inspection._answer("describe", name)
+    answer = inspection._answer("describe", [name])
     assert list(answer) == ["error"]
     assert "/tmp" not in answer["error"]
 
@@ -298,7 +298,7 @@ def test_a_reader_that_takes_too_long_or_dies_is_ended(
     with pytest.raises(UnreadableUploadError, match=r"longer than 0\.01 s"):
         inspection.contents(tmp_path / "M.npz", 0.01)
     monkeypatch.setattr(inspection, "_budget", inspection._Budget(inspection._LEAST_BYTES + 10**6))
-    assert inspection.contents(tmp_path / "M.npz", 30.0)[0]["rows"] == len(M), "its place is free again"
+    assert inspection.contents(tmp_path / "M.npz", 30.0)[0][0]["rows"] == len(M), "its place is free again"
     assert "damaged" in inspection._end(-signal.SIGSEGV, 1.0)
     assert "memory or time" in inspection._end(-signal.SIGKILL, 1.0)
     assert "longer than 1 s" in inspection._end(-signal.SIGXCPU, 1.0)

@@ -12,13 +12,12 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from typing import Any
 
-from fastapi import APIRouter, BackgroundTasks, Request, Response
+from fastapi import APIRouter, Request, Response
 
 from service.errors import NotFoundError
 from service.http.constant import Constant
 from service.http.dependencies import TEXT, InContext, media
 from service.http.middleware.admission import LOGIN
-from service.http.routes.forms import constants
 from service.rendering.page_bundle import bundle
 
 router = APIRouter(include_in_schema=False)
@@ -27,11 +26,7 @@ POLICY = (
     "default-src 'self'; img-src 'self' blob:; object-src 'none'; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'none'"
 )
-_HEADERS = {
-    "Content-Security-Policy": POLICY,
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
-}
+_HEADERS = {"Content-Security-Policy": POLICY}
 _TYPES = {
     ".html": "text/html; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
@@ -83,13 +78,9 @@ INDEX = Constant(_index, _TYPES[".html"], {**_HEADERS, "Cache-Control": "no-cach
 
 
 @router.get("/")
-async def begun(context: InContext, tasks: BackgroundTasks) -> Response:
-    """The page, whose live response is wanted in a moment."""
-    for constant in constants(context.service.registry):
-        constant.prepared()
-    tasks.add_task(context.service.previews.begin)
-    tasks.add_task(context.service.answers.begin)
-    return await INDEX.answer(context.request)
+async def index(request: Request) -> Response:
+    """The page."""
+    return await INDEX.answer(request)
 
 
 @router.get(LOGIN)

@@ -32,37 +32,6 @@ _UNDER_WAY = (JobState.ACCEPTED, JobState.RUNNING)
 _RUN = "run"
 
 
-class _Changed:
-    """The ids of jobs to which something happened, from the service's threads."""
-
-    def __init__(self) -> None:
-        self._loop = asyncio.get_running_loop()
-        self._woken = asyncio.Event()
-        self._ids: set[str] = set()
-
-    def listen(self, event: Event) -> None:
-        """A listener of `Waiters`."""
-        self._loop.call_soon_threadsafe(self._note, event.job_id)
-
-    def wake(self) -> None:
-        """Somebody new listens."""
-        self._woken.set()
-
-    def _note(self, job_id: str) -> None:
-        self._ids.add(job_id)
-        self._woken.set()
-
-    async def taken(self, patience: float) -> set[str]:
-        """Wait so long [s] at most; which jobs they are."""
-        try:
-            await asyncio.wait_for(self._woken.wait(), patience)
-        except TimeoutError:
-            return set()
-        self._woken.clear()
-        taken, self._ids = self._ids, set()
-        return taken
-
-
 @dataclass(eq=False, slots=True)
 class _Listener:
     """One stream: what it was told of runs that have not ended, and what it is to be told."""
@@ -88,16 +57,17 @@ class RunNews:
     def __init__(self, service: Service) -> None:
         self._service = service
         self._heard: dict[str | None, set[_Listener]] = {}
-        self._changed: _Changed | None = None
+        self._reader: asyncio.Task[None] | None = None
+        self._changed: set[str] = set()
 
     async def stream(self, sees: str | None) -> AsyncIterator[bytes]:
         """Yield the events of the runs of an owner, or of everybody's (None), until the service stops."""
         one = _Listener()
         self._heard.setdefault(sees, set()).add(one)
-        if self._changed is None:
-            self._changed = _Changed()
-            self._task = asyncio.create_task(self._read(self._changed))
-        self._changed.wake()
+        if self._reader is None:
+            self._woken = asyncio.Event()
+            self._reader = asyncio.create_task(self._read())
+        self._woken.set()
         try:
             yield format_sse_event(comment="runs", retry=_RETRY_MILLISECONDS)
             while not one.over:
@@ -115,14 +85,32 @@ class RunNews:
             if not self._heard[sees]:
                 del self._heard[sees]
 
-    async def _read(self, changed: _Changed) -> None:
+    def _note(self, job_id: str) -> None:
+        self._changed.add(job_id)
+        self._woken.set()
+
+    async def _taken(self) -> set[str]:
+        """Wait for a while; the jobs to which something happened."""
+        try:
+            await asyncio.wait_for(self._woken.wait(), _LOOK_AGAIN_SECONDS)
+        except TimeoutError:
+            return set()
+        self._woken.clear()
+        taken, self._changed = self._changed, set()
+        return taken
+
+    async def _read(self) -> None:
         """Tell all who listen, as long as there are some; when it ends, they do."""
         service, loop = self._service, asyncio.get_running_loop()
         busy, looked = set[str](), -_LOOK_AGAIN_SECONDS
+
+        def listen(event: Event) -> None:
+            loop.call_soon_threadsafe(self._note, event.job_id)
+
         try:
-            with service.waiters.listening(EVERY, changed.listen):
+            with service.waiters.listening(EVERY, listen):
                 while self._heard:
-                    ids = await changed.taken(_LOOK_AGAIN_SECONDS)
+                    ids = await self._taken()
                     if service.stopping.is_set():
                         break
                     now, asked = loop.time(), set(self._heard)
@@ -137,7 +125,7 @@ class RunNews:
                     streams = sum(map(len, self._heard.values()))
                     await asyncio.sleep(max(_LEAST_SECONDS, streams / _STREAMS_A_SECOND))
         finally:
-            self._changed = None
+            self._reader = None
             for one in (one for several in self._heard.values() for one in several):
                 one.over = True
                 one.woken.set()

@@ -10,6 +10,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
+from service.db.models import Upload
 from service.errors import BodyTooLargeError, InvalidRequestError
 from service.http.dependencies import LISTED, Context, InContext, JsonBody, TypedRoute, listing, saved
 from service.http.in_lane import computed, reading, writing
@@ -26,7 +27,7 @@ from service.schemas.matrix_answers import (
     UploadPage,
 )
 from service.schemas.pages import AskedModel, Cursor, Limit, ListQuery, newest
-from service.uploads.uploads import PART, Arrived, file_name, format_of
+from service.uploads.uploads import PART, file_name, format_of
 
 router = APIRouter(prefix="/v1/uploads", tags=["uploads"])
 
@@ -111,9 +112,9 @@ async def upload(
             raise InvalidRequestError.of(("part",), "goes without a body: its parts are the file", size)
         if len(part) > settings.max_upload_parts:
             raise BodyTooLargeError(f"a file may have {settings.max_upload_parts} parts: {_TOO_LARGE}")
-        arrived = Arrived(path=path, name=name, format=known, size=size, sha256=sha256, parts=tuple(part))
+        given = Upload(name=name, format=known, size=size, sha256=sha256)
         row, found, added = await service.lanes.uploads.run(
-            caller.owner, service.uploads.add, arrived, caller
+            caller.owner, service.uploads.add, path, given, part, caller
         )
     answer = NewUpload.of(row, contents=[UploadedArray(**one) for one in found])
     headers = {"Location": f"/v1/uploads/{row.id}"}
@@ -207,7 +208,6 @@ class MatricesRequest(AskedModel):
 @matrices.get("/formats")
 def formats(context: InContext) -> FormatsAnswer:
     """The formats that can be uploaded."""
-    # Loaded here: a service that only lists does not need SciPy.
     from solver.matrices.readers.registry import readers
 
     return FormatsAnswer(

@@ -27,7 +27,6 @@ def read_measurements(scene: Scene, files: Sequence[Mapping[str, Any]]) -> dict[
     with what they measured; `issues` have `file`, `line`, `column` (null where it is of the whole) and
     `detail`.
     """
-    # Loaded here: it brings SciPy along, which a service that only lists does not need.
     from optim.identification.readers.csv_text import read_text
     from optim.identification.readers.headings import Choice
     from optim.identification.reading import read_data

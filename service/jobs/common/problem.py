@@ -31,8 +31,6 @@ class ProblemRequest(ProblemKeys, Study, HarmonicRequest):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return everything wrong with the problem."""
-        # Loaded here, as below: it brings the compiled loops along, which a service that only lists does not
-        # need.
         from optim.problem.issues import problem_issues, reading_issues
 
         given = arguments(self)

@@ -127,7 +127,6 @@ def design_record(result: DesignResult) -> DesignRecord:
     problem, evaluation, peak = result.problem, result.evaluation, result.peak
     feasible = False
     if evaluation is not None and evaluation.good:
-        # Loaded here: a service that only lists does not need it.
         from optim.criteria.evaluation import natural_scales
         from optim.methods.kkt import KEPT
 

@@ -65,7 +65,6 @@ def result_model(
     types : of keys whose JSON has another one than the attribute, or none that is known here; with a default
         as a pair where results may be without. Of further keys their fields, as of `pydantic.create_model`.
     """
-    # Loaded here: the help of a command whose model is written out needs no numbers.
     from solver.results.base import MadeOfResponses
     from solver.results.known import Known
     from solver.results.read_back import declared

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from optim.criteria.key import LARGEST as LARGEST
-from optim.criteria.key import MAX_HARMONICS as MAX_HARMONICS
+from optim.criteria.key import LEAST as LEAST
 from optim.criteria.key import FrequencyHz as FrequencyHz
 from optim.criteria.key import Harmonics as Harmonics
+from optim.criteria.key import NotNegative as NotNegative
 from optim.criteria.key import Number as Number
 from optim.criteria.key import ParameterPath as ParameterPath
 from optim.criteria.key import PositiveNumber as PositiveNumber
@@ -176,7 +176,6 @@ def read_scene(body: Mapping[str, object], *place: str) -> Scene:
     InvalidRequestError
         Lists everything that is wrong, with subjects below `place`.
     """
-    # Loaded here: the help of a command needs the keys alone.
     from solver.scene.scene import Scene
 
     try:

@@ -20,6 +20,8 @@ MOST_UNKNOWNS = 8_000
 """Of the balance: its matrix, of which a worker holds some, is then 0.5 GB."""
 MOST_STEPS = 100_000_000_000
 """Time steps × DOFs of a march: hours of one processor."""
+QUICK_DOFS = 500
+"""Of the whole disk: of so many it is quickly known how fast they move."""
 FEWEST_STEPS = 256
 """Of a period, where the solver chooses them."""
 MOST_MOTIONS = 40
@@ -53,7 +55,6 @@ def memory_limited(most: int | None) -> Iterator[None]:
 
 def memory_issues(scene: Scene, harmonics: int, *, every_sector: bool = False) -> list[Issue]:
     """Refuse a response whose dense matrices take more memory than a job may, before any is made."""
-    # Loaded here, as below.
     from solver.studies.memory import dense_bytes
 
     needed = dense_bytes(scene, harmonics, every_sector=every_sector).total
@@ -129,7 +130,6 @@ def coefficients(scene: Scene, harmonics: int) -> int:
 
 
 def _sectors(scene: Scene) -> int:
-    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
     from solver.scene.cyclic.annulus import sectors_needed
 
     return sectors_needed(scene).sectors
@@ -164,7 +164,6 @@ def march_issues(
 
     `of_periods` is the key that says how many periods there are.
     """
-    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
     from solver.studies.memory import march_bytes
 
     if not _fits(needed := march_bytes(scene)):
@@ -176,6 +175,11 @@ def march_issues(
     key = of_periods if steps_per_period is None else "steps_per_period"
     words = "steps of a period × periods × DOFs"
     return [Issue((key,), f"`{key}`: {words} must be at most {MOST_STEPS}", steps, named=False)]
+
+
+def is_quick(scene: Scene) -> bool:
+    """Whether what its frequencies allow may be looked at before a job is taken."""
+    return whole_disk_dofs(scene) <= QUICK_DOFS
 
 
 def dofs_solved(scene: Scene) -> int:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
+from optim.criteria.key import Share
 from service.jobs.common.scenes import HarmonicRequest, Number, ParameterPath, check
 from service.jobs.common.sizes import balance_issues
 from service.jobs.registry import Flag
@@ -29,7 +30,7 @@ EffectsWord = Annotated[
     Flag(metavar="auto|all|NAME,…", words=WORDS),
 ]
 Accuracy = Annotated[
-    Annotated[float, Field(strict=True, gt=0.0, lt=1.0)] | None,
+    Share | None,
     Field(description="Estimated error relative to the amplitude; chooses the harmonics itself."),
     Flag(metavar="E"),
 ]
@@ -38,7 +39,6 @@ _FIRST_TRIES = 23  # harmonics; with more unknowns than a few nobody adds any to
 
 def effects_issues(effects: str) -> list[Issue]:
     """Return what is wrong with the word of effects."""
-    # Loaded here, as below: the help of a command needs the keys alone.
     from solver.balance.simplifications import Effects
 
     return check(partial(Effects.read, effects), "effects")
@@ -77,7 +77,6 @@ class RangeRequest(HarmonicRequest):
 
 def range_issues(request: RangeRequest, scene: Scene) -> list[Issue]:
     """Everything wrong with the range for the scene."""
-    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
     from solver.continuation.parameter_scale import scale_of
 
     path = request.parameter
@@ -106,5 +105,12 @@ def law_issues(key: str, scene: Scene) -> list[Issue]:
     """Refuse contacts whose peaks cannot be tracked, as what is wrong with `key`."""
     from solver.studies.peaks.tracker import check_laws
 
-    found = check(partial(check_laws, scene))
-    return [Issue((key,), issue.message, named=False) for issue in found]
+    return of_keys(check(partial(check_laws, scene)), (), key)
+
+
+def of_keys(issues: list[Issue], keys: Collection[str], other: str = "scene") -> list[Issue]:
+    """Return what is wrong with keys of a request as it is; all else as what is wrong with `other`."""
+    return [
+        one if keys and one.subject[0] in keys else Issue((other,), one.message, named=False)
+        for one in issues
+    ]

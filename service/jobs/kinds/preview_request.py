@@ -14,7 +14,6 @@ MOST_HARMONICS = 41
 MOST_UNKNOWNS = 50_000
 POINT_UNKNOWNS = 500
 """Of the balance at one point."""
-LEAST_HZ = 1e-9
 FEW_MOTIONS = 8
 """Of contacts: so few are quick with all harmonics."""
 
@@ -25,12 +24,6 @@ class PreviewRequest(HarmonicRequest):
     client: str = Field(
         default="", max_length=64, description="Who asks: of its previews only the newest is computed."
     )
-
-
-def require_drawable(frequency_hz: float) -> None:
-    """Refuse a frequency at which nothing can be drawn."""
-    if frequency_hz < LEAST_HZ:
-        require([Issue(("frequency_hz",), f"must be at least {LEAST_HZ:g}", frequency_hz)])
 
 
 def scene_of(request: PreviewRequest, source: SceneSource, points: int, harmonics: int) -> Scene:

@@ -27,7 +27,6 @@ from service.jobs.kinds.preview_request import (
     POINT_UNKNOWNS,
     PreviewRequest,
     harmonics_in_time,
-    require_drawable,
     scene_of,
 )
 from service.jobs.kinds.shape_preview import (
@@ -147,7 +146,6 @@ def resolve_limits(request: LimitsPreviewRequest, source: SceneSource) -> Resolv
 
 def resolve_point(request: PointPreviewRequest, source: SceneSource) -> Resolved:
     """Look up the scene, check its size, and choose the harmonics that can be kept in time."""
-    require_drawable(request.frequency_hz)
     scene = scene_of(request, source, 1, request.harmonics)
     kept = harmonics_in_time(scene, request.harmonics, POINT_UNKNOWNS)
     return resolved(scene, harmonics=kept, frequency_hz=request.frequency_hz)

@@ -15,7 +15,6 @@ from service.jobs.kinds.preview_request import (
     POINT_UNKNOWNS,
     PreviewRequest,
     harmonics_in_time,
-    require_drawable,
     scene_of,
 )
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
@@ -125,8 +124,6 @@ def resolve_shape(request: ShapePreviewRequest, source: SceneSource) -> Resolved
     if sum(each is not None for each in (request.frequency_hz, request.mode, request.motion)) != 1:
         named = Naming("must be given, or {mode} or {motion} in its place; one of them")
         require([Issue(("frequency_hz",), named, request.frequency_hz)])
-    if request.frequency_hz is not None:
-        require_drawable(request.frequency_hz)
     if request.frequency_hz is not None and request.nodal_diameter is not None:
         require([Issue(("nodal_diameter",), Naming("needs {mode} or {motion}"), request.nodal_diameter)])
     scene = scene_of(request, source, 1, request.harmonics)

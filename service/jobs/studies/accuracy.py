@@ -58,7 +58,6 @@ class Accuracy(Study):
 
     def issues(self, _scene: Scene) -> list[Issue]:
         """Return what is wrong with the samples."""
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.studies.convergence import check_samples
 
         counts = enumerate(self.samples or ())

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from optim.criteria.key import Name
 from service.jobs.common.results import Table, answered
-from service.jobs.common.scenes import HarmonicRequest, PositiveNumber
+from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, PositiveNumber
 from service.jobs.common.sizes import balance_issues
 from service.jobs.common.study_keys import band_issues
 from service.jobs.registry import Flag
@@ -44,10 +44,10 @@ class Controlled(Study, HarmonicRequest):
     amplitude: Annotated[PositiveNumber, Flag(metavar="A")] = Field(
         description="Amplitude of harmonic 1 that is held [m]."
     )
-    start: Annotated[PositiveNumber | None, Flag(metavar="F")] = Field(
+    start: Annotated[FrequencyHz | None, Flag(metavar="F")] = Field(
         default=None, alias="from", description="First frequency [Hz]; the scene's band if left out."
     )
-    stop: Annotated[PositiveNumber | None, Flag(metavar="F")] = Field(
+    stop: Annotated[FrequencyHz | None, Flag(metavar="F")] = Field(
         default=None, alias="to", description="Last frequency [Hz]."
     )
     dof: Annotated[Name | None, Flag(metavar="NAME")] = Field(
@@ -62,7 +62,8 @@ class Controlled(Study, HarmonicRequest):
         issues = band_issues(scene, self.start, self.stop)
         if self.dof is not None and self.dof not in scene.dofs:
             issues.append(Issue(("dof",), f"must be one of {', '.join(scene.dofs)}", self.dof))
-        if any(force.harmonic != 1 for force in scene.excitation):
+        forces = [force for force in scene.excitation if force.amplitude != 0.0]
+        if not forces or any(force.harmonic != 1 for force in forces):
             wanted = "must have an excitation of harmonic 1 alone: it holds the amplitude"
             issues.append(Issue(("scene",), wanted))
         return issues

@@ -116,7 +116,6 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return everything wrong with a design, robust or not."""
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from optim.problem.issues import uncertainty_issues
 
         given, robust = arguments(self), self.uncertain is not None

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from functools import cache
+from itertools import chain
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import BeforeValidator, Field
 
-from optim.criteria.key import Pair
+from optim.criteria.key import LARGEST, Pair, Share
 from optim.problem.keys import MAX_VARIABLES, VariableName
 from optim.problem.words import ScalingWord
 from service.jobs.common.results import KindResult, Table, answered
@@ -37,6 +38,8 @@ def _small(value: object) -> object:
     lists = [item for table in value for item in table.values() if isinstance(item, list)]
     if sum(map(len, lists)) > MOST_NUMBERS:
         raise ValueError(f"must hold at most {MOST_NUMBERS} numbers")
+    if any(isinstance(one, int | float) and abs(one) > LARGEST for one in chain(*lists)):
+        raise ValueError(f"must hold numbers from {-LARGEST:g} to {LARGEST:g}")
     return value
 
 
@@ -79,7 +82,7 @@ class Measured(Study, HarmonicRequest):
         max_length=MAX_VARIABLES,
         description="What was known before: path to [mean, standard deviation].",
     )
-    noise: Annotated[Annotated[float, Field(strict=True, gt=0.0, lt=1.0)] | None, Flag(metavar="R")] = Field(
+    noise: Annotated[Share | None, Flag(metavar="R")] = Field(
         default=None, description="Noise relative to the amplitude; found from the data if left out."
     )
     starts: Annotated[int, Field(strict=True, ge=1, le=1000), Flag(metavar="N")] = Field(
@@ -98,7 +101,6 @@ class Measured(Study, HarmonicRequest):
 
     def read_issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the whole description, by the pointer of its field."""
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from optim.identification.reading import read_data
         from optim.identification.unknowns import read_unknowns
 

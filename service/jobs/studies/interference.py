@@ -7,18 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
+from optim.criteria.key import SpeedRpm
 from service.jobs.common.results import answered
-from service.jobs.common.scenes import PositiveNumber, check
-from service.jobs.common.sizes import memory_issues
+from service.jobs.common.scenes import FrequencyHz, check
+from service.jobs.common.sizes import is_quick, memory_issues
+from service.jobs.common.study_keys import of_keys
 from service.jobs.registry import Flag, Json
 from service.jobs.study import Study
 from solver.errors import Issue
+from solver.results.views import on_demand
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
-_MOST_RPM = 6e10  # a revolution at the highest frequency that is accepted anywhere
-_Speed = Annotated[PositiveNumber, Field(le=_MOST_RPM)]
 _Orders = Annotated[
     list[Annotated[int, Field(strict=True, ge=1, le=1_000_000)]], Field(min_length=1, max_length=1000)
 ]
@@ -38,7 +39,7 @@ class Interference(Study):
     FIGURE = "solver.views.plots.disks:interference_figure"
     COUNTED = "nodal diameters"
 
-    speed_rpm: Annotated[_Speed | None, Flag("--speed", "RPM")] = Field(
+    speed_rpm: Annotated[SpeedRpm | None, Flag("--speed", "RPM")] = Field(
         default=None, description="Speed of rotation [1/min]; the scene's own, and without one no orders."
     )
     orders: Annotated[_Orders | None, Flag("--order", "N")] = Field(
@@ -47,7 +48,7 @@ class Interference(Study):
     families: Annotated[int, Field(strict=True, ge=1, le=100), Flag(metavar="N")] = Field(
         default=6, description="How many natural frequencies at each nodal diameter."
     )
-    up_to_hz: Annotated[PositiveNumber | None, Flag("--up-to", "HZ")] = Field(
+    up_to_hz: Annotated[FrequencyHz | None, Flag("--up-to", "HZ")] = Field(
         default=None, description="Families that begin above are left out [Hz]."
     )
     within: Annotated[float, Field(ge=0.0, le=1.0), Flag(metavar="S")] = Field(
@@ -56,7 +57,6 @@ class Interference(Study):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return why it is no disk, or a speed that cannot be."""
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.studies.interference import checked_speed
 
         return check(partial(checked_speed, scene, self.speed_rpm, self.orders))
@@ -65,7 +65,11 @@ class Interference(Study):
         """Return what is too large."""
         from solver.studies.mistuning import without_mistuning
 
-        return memory_issues(without_mistuning(scene), 1)
+        if (large := memory_issues(without_mistuning(scene), 1)) or not is_quick(scene):
+            return large
+        # How many orders reach the frequencies only these say.
+        drawn = partial(on_demand(self.FUNCTION), scene, **self.spec(scene))
+        return of_keys(check(drawn), self.own_keys())
 
     @classmethod
     def empty(cls, result: Json) -> str:

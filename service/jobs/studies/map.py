@@ -133,7 +133,6 @@ def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutpu
 
 
 def _grid(spec: Mapping[str, Any]) -> MapGrid:
-    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
     from solver.studies.response_map import map_grid
 
     given = {name: value for name, value in spec.items() if name not in (SCENE, CHECKED_BY)}

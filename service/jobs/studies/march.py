@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field
 
 from service.jobs.common.results import Table, answered
-from service.jobs.common.scenes import FrequencyHz
-from service.jobs.common.sizes import march_issues
+from service.jobs.common.scenes import FrequencyHz, check
+from service.jobs.common.sizes import is_quick, march_issues
+from service.jobs.common.study_keys import of_keys
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
@@ -58,7 +59,11 @@ class March(Study):
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
-        return march_issues(scene, self.steps_per_period, self.max_periods)
+        from solver.marching.march import marched
+
+        steps = partial(marched, scene, self.frequency_hz, self.steps_per_period)
+        large = march_issues(scene, self.steps_per_period, self.max_periods)
+        return large or (of_keys(check(steps), self.own_keys()) if is_quick(scene) else [])
 
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:

@@ -56,7 +56,6 @@ class Margin(Study, HarmonicRequest):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the ends and the dampers."""
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.studies.margin_diagram import checked_dampers, checked_levels
 
         if self.stop <= self.start:

@@ -139,7 +139,6 @@ class Mistuning(Study, HarmonicRequest):
 
     def _drawn(self, scene: Scene) -> list[Issue]:
         """Refuse parts that are not there, and factors that are not above 0."""
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.studies.mistuning import disk_factors
 
         return part_issues(lambda: disk_factors(scene, self.of, self.spread, self.samples, self.seed))

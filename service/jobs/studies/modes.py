@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, Field, RootModel
@@ -13,6 +13,7 @@ from service.jobs.common.proofs import CERTIFICATES, beside, prepare
 from service.jobs.common.results import Table, answered
 from service.jobs.common.scenes import HarmonicRequest, Number, PositiveNumber, check
 from service.jobs.common.sizes import MOST_MOTIONS, POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.common.study_keys import of_keys
 from service.jobs.registry import Flag, Json, ReadSweep, StoredSweep
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue, Naming
@@ -42,7 +43,6 @@ def motions_of(found: solver.NonlinearMode) -> dict[str, Any]:
     imaginary parts of harmonic 1 of the degrees of freedom `dofs` over the amplitude [1/√kg]. Of more
     contacts or degrees of freedom than fit, the first are given.
     """
-    # Loaded here: the help of the command needs no numbers.
     import numpy as np
 
     count = found.amplitude.size
@@ -183,7 +183,7 @@ class Modes(Study, HarmonicRequest):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return which questions do not go together, and what is wrong with the mode."""
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+        from solver.modes.limit_cycles import check_loads
         from solver.modes.nonlinear_mode import at_nodal_diameter, check_mode
 
         fed = self.aero_damping is not None
@@ -201,6 +201,7 @@ class Modes(Study, HarmonicRequest):
             ("phase_resonance", apart, "is a curve of its own: leave {performance} and {aero_damping} out"),
         )  # fmt: skip
         wrong = [Issue((key,), Naming(said)) for key, bad, said in words if bad]
+        wrong += of_keys(check(partial(check_loads, scene)), (), "aero_damping") if fed else []
         return wrong + check(lambda: check_mode(at_nodal_diameter(scene, self.nodal_diameter), self.mode))
 
     def sizes(self, scene: Scene) -> list[Issue]:

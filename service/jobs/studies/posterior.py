@@ -117,7 +117,6 @@ class PosteriorStudy(Measured):
 
     def read_issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the whole description, of every model."""
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from optim.errors import DesignError
 
         found = super().read_issues(scene)

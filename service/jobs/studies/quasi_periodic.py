@@ -10,10 +10,11 @@ from pydantic import BaseModel, Field, RootModel
 
 from optim.criteria.key import Name
 from service.jobs.common.results import answered
-from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, Number, check
+from service.jobs.common.scenes import LEAST, FrequencyHz, HarmonicRequest, Number, check
 from service.jobs.common.sizes import balance_issues
 from service.jobs.registry import Flag, Json
 from service.jobs.study import Answer, Study, Watch
+from solver.contacts.fields import Angle
 from solver.errors import Issue
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ class QuasiPeriodicStudy(Study, HarmonicRequest):
     dof: Annotated[Name | None, Flag(metavar="NAME")] = Field(
         default=None, description="DOF it acts on; that of the scene's first force."
     )
-    phase: Annotated[Number, Flag(metavar="RAD")] = Field(default=0.0, description="Its phase [rad].")
+    phase: Annotated[Angle, Flag(metavar="RAD")] = Field(default=0.0, description="Its phase [rad].")
     engine_order: Annotated[int | None, Field(strict=True, ge=0, le=10_000), Flag(metavar="N")] = Field(
         default=None, description="Its engine order on a disk; the scene's."
     )
@@ -78,13 +79,12 @@ class QuasiPeriodicStudy(Study, HarmonicRequest):
         default=90,
         description="Most turns of the faster frequency after which the motion is taken to repeat.",
     )
-    tolerance: Annotated[float, Field(strict=True, gt=0.0, le=0.1), Flag(metavar="E")] = Field(
+    tolerance: Annotated[float, Field(strict=True, ge=LEAST, le=0.1), Flag(metavar="E")] = Field(
         default=2e-3, description="Change by longer periods, relative, at which they are long enough."
     )
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with frequencies, force and lengths."""
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.response.quasi_periodic import check as checked
         from solver.response.quasi_periodic import second_force
 
@@ -109,7 +109,6 @@ class QuasiPeriodicStudy(Study, HarmonicRequest):
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
         """Find one response, or a curve of them."""
         if "to_hz" in asked:
-            # Loaded here: the command's help needs no numbers.
             from solver import quasi_periodic_curve
 
             return Answer.of(quasi_periodic_curve(scene, **asked, **watch._asdict()))

@@ -34,7 +34,6 @@ _NONE = "No solution was found: try more starts or more harmonics."
 @cache
 def solve_result() -> type[KindResult]:
     """Return the schema of one periodic response: of a search for all, the largest, with what was found."""
-    # Loaded here: the help of the command needs no numbers.
     from solver.response.solution import Solution
 
     further: dict[str, Any] = {

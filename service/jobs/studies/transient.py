@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import Field
 
 from service.jobs.common.results import answered
-from service.jobs.common.scenes import Number, PositiveNumber, check
-from service.jobs.common.sizes import march_issues
+from service.jobs.common.scenes import NotNegative, PositiveNumber, check
+from service.jobs.common.sizes import is_quick, march_issues
+from service.jobs.common.study_keys import of_keys
 from service.jobs.registry import Flag
 from service.jobs.study import Study
 from solver.errors import Issue, SettingError
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
 _Rates = Annotated[list[PositiveNumber], Field(min_length=1, max_length=50)]
-_NotNegative = Annotated[Number, Field(ge=0.0)]
 
 
 class Transient(Study):
@@ -36,10 +36,10 @@ class Transient(Study):
     SHOWS, COUNTED = "the largest amplitude of a run ([transients](transients.md))", "turns"
     FIGURE, EMPTY = "solver.views.plots.transients:transient_figure", ("time", "nothing was run through")
 
-    begin_hz: Annotated[_NotNegative | None, Flag("--from", "F")] = Field(
+    begin_hz: Annotated[NotNegative | None, Flag("--from", "F")] = Field(
         default=None, description="Frequency at the beginning [Hz]; that of the scene's band."
     )
-    end_hz: Annotated[_NotNegative | None, Flag("--to", "F")] = Field(
+    end_hz: Annotated[NotNegative | None, Flag("--to", "F")] = Field(
         default=None, description="Frequency at the end [Hz]; below the first one in a run-down."
     )
     rate_hz_per_s: Annotated[PositiveNumber | None, Flag("--rate", "R")] = Field(
@@ -52,7 +52,7 @@ class Transient(Study):
         default=None,
         description="Several rates [Hz/s] in place of these: the largest amplitude over the rate.",
     )
-    ring_down_seconds: Annotated[_NotNegative, Flag(metavar="T")] = Field(
+    ring_down_seconds: Annotated[NotNegative, Flag(metavar="T")] = Field(
         default=0.0, description="How long the motion is followed after that without excitation [s]."
     )
     from_rest: Annotated[bool, Field(strict=True)] = Field(
@@ -65,27 +65,30 @@ class Transient(Study):
         Field(default=None, description="Steps in a period of the highest frequency; chosen if left out.")
     )
 
-    def ramps(self, scene: Scene) -> tuple[Ramp, ...]:
-        """Return what is to be run through; SettingError names what is wrong."""
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+    def runs(self, scene: Scene) -> list[tuple[Ramp, ...]]:
+        """Return what is to be run through at each rate; SettingError names what is wrong."""
         from solver.marching.transient import ramps_of
 
         keys = ("begin_hz", "end_hz", "rate_hz_per_s", "ramp_seconds", "ring_down_seconds")
         given = {key: getattr(self, key) for key in keys}
         if self.rates is None:
-            return ramps_of(scene, **given)
+            return [ramps_of(scene, **given)]
         if self.rate_hz_per_s is not None:
             raise SettingError("rate_hz_per_s", self.rate_hz_per_s, "must not be given beside `rates`")
-        runs = [ramps_of(scene, **{**given, "rate_hz_per_s": rate}) for rate in self.rates]
-        return tuple(ramp for run in runs for ramp in run)
+        return [ramps_of(scene, **{**given, "rate_hz_per_s": rate}) for rate in self.rates]
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the range and the rate."""
-        return check(partial(self.ramps, scene))
+        return check(partial(self.runs, scene))
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
-        ramps = self.ramps(scene)
-        periods = sum(ramp.seconds for ramp in ramps) * max(ramps[0].begin_hz, ramps[0].end_hz)
+        from solver.marching.transient import check_passage
+
+        runs = self.runs(scene)
+        first, slowest = runs[0][0], max(runs, key=lambda run: run[0].seconds)
+        periods = sum(ramp.seconds for run in runs for ramp in run) * max(first.begin_hz, first.end_hz)
         key = "rate_hz_per_s" if self.ramp_seconds is None else "ramp_seconds"
-        return march_issues(scene, self.steps_per_period, math.ceil(periods), key)
+        large = march_issues(scene, self.steps_per_period, math.ceil(periods), key)
+        passable = partial(check_passage, scene, slowest, self.steps_per_period, from_rest=self.from_rest)
+        return large or (of_keys(check(passable), self.own_keys()) if is_quick(scene) else [])

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from optim.criteria.key import FrequencyHz, Name, ParameterPath
 from service.jobs.common.results import Curve, Table, answered
-from service.jobs.common.scenes import HarmonicRequest, Number, PositiveNumber, check
+from service.jobs.common.scenes import HarmonicRequest, NotNegative, Number, PositiveNumber, check
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.registry import Flag
 from service.jobs.study import Answer, Study, Watch
@@ -24,7 +24,6 @@ _OF_A_CHOICE = ("parameter", "start", "stop", "from_hours", "factors", "looks")
 _OF_A_LIFE = ("limit", "paths", "points", "tolerance")
 _CHOOSING, _CLOSING = 0.8, 10  # share of the time of a choice, and lives that close in on it
 _STEPS = 20  # over the hours, each with a look at the whole band
-_NotNegative = Annotated[float, Field(strict=True, ge=0.0, le=1e15)]
 _OfContacts = list[Curve]
 _Block = Annotated[list[PositiveNumber], Field(min_length=2, max_length=2)]
 
@@ -59,18 +58,18 @@ class Wear(Study, HarmonicRequest):
     hours: Annotated[PositiveNumber, Field(le=1e9), Flag(metavar="H")] = Field(
         description="How long it runs [h]."
     )
-    coefficient: Annotated[dict[Name, _NotNegative], Field(min_length=1), Flag(metavar="CONTACT=X")] = Field(
+    coefficient: Annotated[dict[Name, NotNegative], Field(min_length=1), Flag(metavar="CONTACT=X")] = Field(
         description="Wear coefficient [1/Pa, which is m³/J] of each contact or group that wears."
     )
     area: Annotated[dict[Name, PositiveNumber], Field(min_length=1), Flag(metavar="CONTACT=X")] = Field(
         description="Nominal area of each [m²]."
     )
-    load_loss_per_depth: Annotated[dict[Name, _NotNegative] | None, Flag("--load-loss", "CONTACT=X")] = Field(
+    load_loss_per_depth: Annotated[dict[Name, NotNegative] | None, Flag("--load-loss", "CONTACT=X")] = Field(
         default=None,
         description="What a depth of 1 m takes from the normal load of each [N/m]; its normal stiffness kn.",
     )
     stiffness_loss_per_depth: Annotated[
-        dict[Name, _NotNegative] | None, Flag("--stiffness-loss", "CONTACT=X")
+        dict[Name, NotNegative] | None, Flag("--stiffness-loss", "CONTACT=X")
     ] = Field(
         default=None, description="What it takes from the tangential stiffness kt of each [N/m²]; nothing."
     )
@@ -106,7 +105,7 @@ class Wear(Study, HarmonicRequest):
     stop: Annotated[Number | None, Flag(metavar="B")] = Field(
         default=None, alias="to", description="Its largest value."
     )
-    from_hours: Annotated[_NotNegative | None, Flag(metavar="H")] = Field(
+    from_hours: Annotated[NotNegative | None, Flag(metavar="H")] = Field(
         default=None, description="From when on its amplitude counts [h], 0 the whole life; the end alone."
     )
     factors: Annotated[_Block, Flag(metavar="LO HI")] = Field(
@@ -157,7 +156,6 @@ class Wear(Study, HarmonicRequest):
         )  # fmt: skip
 
     def _checked(self, scene: Scene) -> None:
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.studies.wear_life.life import course_of
         from solver.studies.wear_life.mission import Mission
         from solver.studies.wear_life.wearing import WearLaw

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from optim.criteria.key import Name
 from service.jobs.common.results import Table, answered
-from service.jobs.common.scenes import FrequencyHz, HarmonicRequest
+from service.jobs.common.scenes import LEAST, FrequencyHz, HarmonicRequest
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.common.study_keys import band_issues
 from service.jobs.registry import Flag
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
 _MOST_STARTS, _MOST_CLIMB, _MOST_PATTERNS = 1000, 200, 50
-_Share = Annotated[float, Field(strict=True, gt=0.0, le=0.9)]
+_Share = Annotated[float, Field(strict=True, ge=LEAST, le=0.9)]
 _Pattern = Annotated[str, Field(pattern=r"^[A-Z]{1,100}$")]
 
 
@@ -102,7 +102,6 @@ class WorstMistuningStudy(Study, HarmonicRequest):
         )
 
     def _checked(self, scene: Scene) -> None:
-        # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
         from solver.studies.blades import mistuned
         from solver.studies.patterns.intentional import IntentionalMistuning
         from solver.studies.patterns.linear_disk import Contacts, check_linear

@@ -30,6 +30,7 @@ SECONDS_AN_HOUR = 3600.0
 
 PerContact = float | Mapping[str, float]
 """A number of every contact with friction, or by contact or group."""
+_NOTHING = 1e-12  # of a stiffness, which laws want above 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +102,9 @@ class Wearing:
         """Return the scene worn by `depths` (n,) [m], nothing below its least; or SettingError of a law."""
         contacts = list(self.scene.contacts)
         for loss in self.losses:
-            place, value = self.places[loss.contact], max(self.number(loss, depths), loss.least)
+            # A step that is tried and not taken may lead anywhere.
+            place = self.places[loss.contact]
+            value = min(max(self.number(loss, depths), loss.least), LARGEST)
             old = contacts[place]
             contacts[place] = changed(
                 old, old.changed_by(loss.key, value), loss.path, value, "must be what its law takes"
@@ -187,7 +190,9 @@ def _loss(scene: Scene, i: int, contact: AnyContact, key: str, per_depth: float,
         raise SettingError(asked, per_depth, wanted)
     if scene.with_speed and follows_speed(scene, path) is not None:
         raise SettingError(asked, per_depth, f"must not lower {path}, which follows the speed (`with_speed`)")
-    least = -math.inf if key == LOAD and getattr(contact, "moving", None) is not None else 0.0
+    least = 0.0 if key == LOAD else _NOTHING * contact.value_of(key)
+    if key == LOAD and getattr(contact, "moving", None) is not None:
+        least = -math.inf
     return Loss(contact=i, key=key, path=path, per_depth=per_depth, of_kn=of_kn, least=least)
 
 
