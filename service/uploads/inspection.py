@@ -101,9 +101,7 @@ def look_at(asked: Mapping[str, Any], folder: Path, seconds: float, most_bytes: 
     return found
 
 
-def _ask(
-    task: str, folder: Path, argument: Any, seconds: float, most_bytes: int, writes: int = 0
-) -> Any:
+def _ask(task: str, folder: Path, argument: Any, seconds: float, most_bytes: int, writes: int = 0) -> Any:
     sent = sum(file.stat().st_size for file in folder.iterdir())  # never what an archive says of itself
     inside = _INFLATED * sent if any(map(zipfile.is_zipfile, folder.iterdir())) else 0
     memory = min(_LEAST_BYTES + _TIMES * (sent + inside), MEMORY_BYTES)
