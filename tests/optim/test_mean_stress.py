@@ -57,6 +57,7 @@ def test_no_design_keeps_a_margin_where_the_mean_is_beyond_the_strength() -> Non
     assert any("the mean stress alone reaches the strength" in words for words in found.warnings)
 
 
+@pytest.mark.long
 def test_a_design_keeps_the_margin_of_the_worst_mean() -> None:
     # At 0.3 Hz the contact sticks and may push with what vibration leaves of its limit, for a load N
     # m = 0.82 + N/2 − 0.6 a [GPa], which U = a/30/(1 − m/0.9) = 1 bounds; the least peak is at a larger load.

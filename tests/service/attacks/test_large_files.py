@@ -134,7 +134,8 @@ def place(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
         yield made
 
 
-@pytest.mark.parametrize("kills", [2, pytest.param(30, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("kills", [2, 30])
 def test_parts_or_the_file_are_there_whenever_the_service_is_killed(
     place: str, tmp_path: Path, kills: int
 ) -> None:
