@@ -33,21 +33,24 @@ def cursors() -> list[str]:
     return [base64.urlsafe_b64encode(text.encode()).decode().rstrip("=") for text in texts]
 
 
-def test_the_ends_of_every_query_parameter(shipped: httpx.Client) -> None:
+@pytest.mark.parametrize("step", [6, pytest.param(1, marks=pytest.mark.long)])
+def test_the_ends_of_every_query_parameter(shipped: httpx.Client, step: int) -> None:
+    """Each parameter at every `step`-th value, those of one parameter not those of the next."""
     described = shipped.get("/openapi.json").json()["paths"]
-    failed, asked = [], 0
+    failed, asked, first = [], 0, 0
     for path, operations in described.items():
         for one in operations.get("get", {}).get("parameters", ()):
             if one["in"] != "query" or path.endswith("/events"):
                 continue
             address = path.replace("{job_id}", "none").replace("{", "").replace("}", "")
             values = cursors() if one["name"] == "cursor" else DATES + NUMBERS
-            for value in values:
+            first += 1
+            for value in values[first % step :: step]:
                 answer = shipped.get(address, params={one["name"]: value})
                 asked += 1
                 if answer.status_code >= 500:
                     failed.append((path, one["name"], value, answer.status_code))
-    assert asked > 1000
+    assert asked > 1000 / step
     assert failed == []
 
 
