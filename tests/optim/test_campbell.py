@@ -237,7 +237,7 @@ def test_pictures_are_written(
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
-        ("two-dof --speeds 10 5", "`--speeds` must have 0 < low < high"),
+        ("two-dof --speeds 10 5", "`--speeds` must have low < high"),
         ("two-dof --speeds nan 5", "`--speeds` must be a finite number, got nan"),
         ("two-dof --speeds 5 10 --order 0", "`--order` must be a whole number >= 1"),
         ("two-dof --speeds 5 10 --order x", "must be a whole number, got 'x'"),

@@ -200,7 +200,7 @@ def test_what_a_search_counts_is_the_utilisation_and_continues_it() -> None:
             left = Fraction(1) - (Fraction(max(mean, 0.0)) / 900) ** (1 + int(line))
             exact = math.inf if left <= 0 else float(Fraction(amplitude) / 300 / left)
             assert utilisation_of(counts[0]) == pytest.approx(exact, rel=1e-9)
-            step = 1e-6 * amplitude
+            step = 1e-6 * max(amplitude, 1.0)  # rounding of a mean of 1500 is 2e-13
             up, down = (utilisation(haigh, mean + amplitude + s, mean - amplitude - s) for s in (step, -step))
             assert counts[1] == pytest.approx((up[0] - down[0]) / (2.0 * step), rel=1e-4, abs=1e-6)
             assert counts[3] == pytest.approx(

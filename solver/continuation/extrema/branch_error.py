@@ -98,7 +98,7 @@ def branch_error(
         for peak in _rivals(peaks)
     ]
     estimate = errors[0]
-    if estimate >= peaks[0].value and _is_rounding(workspace, peaks[0]):
+    if estimate >= peaks[0].value and _nothing_damps(workspace, points, peaks[0]):
         return math.inf
     if not math.isfinite(estimate):
         return math.nan
@@ -111,15 +111,27 @@ def branch_error(
     return max(estimate, reached - peaks[0].value)
 
 
-def _is_rounding(workspace: Workspace, peak: Peak) -> bool:
-    """Return whether no digit of a maximum over the frequency is more than rounding."""
+def _nothing_damps(workspace: Workspace, points: Points, peak: Peak) -> bool:
+    """Return whether no digit of a maximum over the frequency is more than rounding, beside which there are.
+
+    Where there are none beside it either, what is observed does not move.
+    """
     parameter = workspace.balance.parameter
     if not peak.interior or parameter.kind is not Kind.FREQUENCY:
         return False
-    p = float(parameter.inside(peak.at))
+    every = [(peak.solution, float(parameter.inside(peak.at)), peak.value)]
+    every += [
+        (points.solutions[i, :-1], float(points.solutions[i, -1]), float(np.abs(points.observed[i]).max()))
+        for i in (0, -1)
+    ]
+    at_peak, *at_ends = (_is_rounding(workspace, *one) for one in every)
+    return at_peak and not all(at_ends)
+
+
+def _is_rounding(workspace: Workspace, solution: Real, p: float, value: float) -> bool:
     receptance(workspace.system, p, workspace.linear)
-    evaluate(workspace.system, workspace.linear, peak.solution, p, 0.0, workspace.point)
-    return not observed_rounding(workspace, peak.solution, p, across=True) < peak.value
+    evaluate(workspace.system, workspace.linear, solution, p, 0.0, workspace.point)
+    return not observed_rounding(workspace, solution, p, across=True) < value
 
 
 def _rivals(peaks: tuple[Peak, ...]) -> tuple[Peak, ...]:

@@ -245,7 +245,7 @@ def test_endless_changes_are_reported(monkeypatch: pytest.MonkeyPatch):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ({"frequency_hz": 0.0}, "`frequency_hz` must be a number > 0"),
+        ({"frequency_hz": 0.0}, "`frequency_hz` must be a frequency > 0 Hz"),
         ({"frequency_hz": math.nan}, "got nan"),
         ({"frequency_hz": "1"}, "got '1'"),
         ({"tolerance": 1e-20}, "`tolerance` must be a number from 1e-13"),

@@ -151,7 +151,7 @@ def test_what_cannot_be_differentiated_is_refused_by_name() -> None:
     sampled = build(scene, harmonics=3)
     sampled = Balance(
         scene=sampled.scene, parameter=sampled.parameter, system=sampled.system._replace(samples=64),
-        n_harmonics=3, effects=sampled.effects,
+        n_harmonics=3, effects=sampled.effects, sizes=sampled.sizes,
     )  # fmt: skip
     with pytest.raises(SettingError, match="closed form"):
         Sensitivities(sampled, ["damper.N0"])
