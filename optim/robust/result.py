@@ -221,8 +221,8 @@ class RobustResult(MadeOfResponses, Drawn):
 
     @property
     def gain(self) -> FloatOrNaN:
-        """By which share the robust optimum lowers the worst peak of the nominal one."""
-        if self.nominal is None or self.robust is None:
+        """By which share the robust optimum lowers the worst peak of the nominal one; NaN of a peak of 0."""
+        if self.nominal is None or self.robust is None or not self.nominal.worst_peak:
             return math.nan
         return 1.0 - self.robust.worst_peak / self.nominal.worst_peak
 

@@ -14,7 +14,6 @@ from service.jobs.common.scenes import LEAST, FrequencyHz, HarmonicRequest, Numb
 from service.jobs.common.sizes import balance_issues
 from service.jobs.registry import Flag, Json
 from service.jobs.study import Answer, Study, Watch
-from solver.contacts.fields import Angle
 from solver.errors import Issue
 
 if TYPE_CHECKING:
@@ -68,7 +67,9 @@ class QuasiPeriodicStudy(Study, HarmonicRequest):
     dof: Annotated[Name | None, Flag(metavar="NAME")] = Field(
         default=None, description="DOF it acts on; that of the scene's first force."
     )
-    phase: Annotated[Angle, Flag(metavar="RAD")] = Field(default=0.0, description="Its phase [rad].")
+    phase: Annotated[float, Field(strict=True, ge=-1e4, le=1e4), Flag(metavar="RAD")] = Field(
+        default=0.0, description="Its phase [rad]."
+    )
     engine_order: Annotated[int | None, Field(strict=True, ge=0, le=10_000), Flag(metavar="N")] = Field(
         default=None, description="Its engine order on a disk; the scene's."
     )
