@@ -1,7 +1,7 @@
 // What is said of a run: name, notes, tags, project; its sweeps; its results as a file; into the bin.
 
 import { request } from "../network/api.js";
-import { el } from "../base/dom.js";
+import { el, show } from "../base/dom.js";
 import { tell } from "../base/events.js";
 import { saveFrom } from "../base/exports.js";
 import { projectsKnown } from "./projects.js";
@@ -16,8 +16,8 @@ export function runForm(run, title) {
   const field = (name, words, input) => [el("label", { for: `run-${name}-${run.id}` }, words), input];
   const input = (name, value) => el("input", { type: "text", id: `run-${name}-${run.id}`, name, value });
   const notes = el("textarea", { id: `run-notes-${run.id}`, name: "notes", rows: 3 }, run.notes);
-  const project = el("select", { id: `run-project-${run.id}`, name: "project" },
-    el("option", { value: "" }, "none"), projectsKnown().map(({ id, name }) => el("option", { value: id, selected: id === run.project }, name)));
+  const project = el("select", { id: `run-project-${run.id}`, name: "project", onfocus: () => offer(project, project.value) });
+  offer(project, run.project ?? "");
   const wrong = el("p", { class: "bad", role: "alert" });
   const form = el("form", { class: "run-form" },
     field("name", "Name", input("name", run.name)), field("notes", "Notes", notes),
@@ -30,6 +30,14 @@ export function runForm(run, title) {
     save(run, form, wrong);
   });
   return [form, run.sweeps ? sweepsOf(run, title) : null];
+}
+
+// The projects there are; the one it has stays chosen while they are not known yet.
+function offer(select, chosen) {
+  const known = projectsKnown();
+  const own = !chosen || known.some(({ id }) => id === chosen) ? [] : [{ id: chosen, name: "its project" }];
+  show(select, el("option", { value: "" }, "none"), [...own, ...known].map(({ id, name }) => el("option", { value: id }, name)));
+  select.value = chosen;
 }
 
 async function save(run, form, wrong) {
