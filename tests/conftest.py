@@ -1,13 +1,13 @@
 import gc
 import os
-import zlib
-from collections import Counter
-from collections.abc import Collection, Generator, Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from launch import served
+
+pytest_plugins = ("tests.tiers",)
 
 # Before anything loads numpy. Workers compute with one thread; who computes the same with several gets other
 # last bits, and two processes of pytest have no more than two cores between them.
@@ -55,52 +55,6 @@ def pytest_collection() -> Generator[None, object, object]:
     finally:
         gc.freeze()
         gc.enable()
-
-
-def pytest_addoption(parser: pytest.Parser) -> None:
-    """All long tests take ten hours; a tenth of each function's cases, in turn, takes one."""
-    parser.addoption("--part", type=_part, metavar="K/N", help="of the long tests the K-th of N parts alone")
-
-
-def _part(text: str) -> tuple[int, int]:
-    number, _, parts = text.partition("/")
-    if not (number.isdecimal() and parts.isdecimal() and 1 <= int(number) <= int(parts)):
-        raise ValueError(text)  # argparse words it
-    return int(number), int(parts)
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Of the cases of a function marked `few` every n-th runs and those to keep; the others are long.
-
-    With `--part` the long cases of a function are dealt out to the parts one after the other, beginning with
-    a part that its name decides: each part has its share of every function.
-    """
-    number, parts = config.getoption("--part") or (1, 1)
-    seen: Counter[str] = Counter()
-    dealt: Counter[str] = Counter()
-    of_other_parts = []
-    for item in items:
-        function = item.nodeid.partition("[")[0]
-        if few := item.get_closest_marker("few"):
-            kept = bool(few.args) and seen[function] % few.args[0] == 0
-            seen[function] += 1
-            if not kept and not _named(item, few.kwargs.get("keep", ())):
-                item.add_marker(pytest.mark.long)
-        if item.get_closest_marker("long"):
-            if (zlib.crc32(function.encode()) + dealt[function] - number) % parts:
-                of_other_parts.append(item)
-            dealt[function] += 1
-    if of_other_parts:
-        config.hook.pytest_deselected(items=of_other_parts)
-        others = set(of_other_parts)
-        items[:] = [item for item in items if item not in others]
-
-
-def _named(item: pytest.Item, keep: Collection[object]) -> bool:
-    """Whether a value that a case has is one of those to keep."""
-    values = item.callspec.params.values() if isinstance(item, pytest.Function) else ()
-    return any(value in keep for value in values if isinstance(value, str | int | float))
 
 
 @pytest.fixture(scope="session")
