@@ -2,13 +2,12 @@
 
 PYTHON ?= python3
 BIN := .venv/bin
-# Bytecode is compiled on all cores, where pip would do it on one. Not to leave it to the first imports: where
-# Python is told to write none (PYTHONDONTWRITEBYTECODE) every process would take a second longer to start.
+# Python writes the bytecode of what is imported, most of it while the kernels are compiled: pip would compile
+# fifteen thousand modules, of which two thousand are ever imported.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 # The packages of parts of constraints.txt, of files whose digests stand there alone.
 PINNED = awk -v parts=" $(1) " '/^\# / {on = index(parts, " " $$2 " ")} on' constraints.txt \
 	  | $(PIP) --require-hashes -r /dev/stdin
-BYTECODE := $(BIN)/python -m compileall -q -j 0 .venv/lib stickslip solver optim service migrations
 PACKAGES := .venv/.packages
 STAMP := .venv/.up-to-date
 DEV := .venv/.for-development
@@ -16,17 +15,22 @@ DEV := .venv/.for-development
 PYTEST ?=
 # Which part of the long tests, such as 3/10, the third tenth of each.
 PART ?= 1/1
+# With COSTS=1 `make test-all` writes what each test costs to tests/costs.json, which says what `make test` runs.
+COSTS ?=
+# With TIER=rest it runs what `make test` leaves.
+TIER ?= all
 # Which benchmarks: all when empty; `python -m benchmarks --help` lists them.
 BENCH ?=
 .DEFAULT_GOAL := help
-.PHONY: help setup dev demo test test-long style lint bench docs pins sbom serve clean
+.PHONY: help setup dev demo test test-all test-long style lint bench docs pins sbom serve clean
 
 help:
 	@echo "make setup      set up .venv; the command is then $(BIN)/stickslip"
 	@echo "make dev        add to it what tests, checks, benchmarks and the reference need"
 	@echo "make demo       run the main job end to end; pictures go to demo-output/"
-	@echo "make test       check the code and run every test but the long ones"
-	@echo "make test-long  run the long studies, ten hours of them; a tenth of each: make test-long PART=3/10""
+	@echo "make test       run the cheap tests, one case of each: every claim once, a few minutes"
+	@echo "make test-all   check the types too and run every test but the long ones: a quarter of an hour"
+	@echo "make test-long  run the long studies, ten hours of them; a tenth of each: make test-long PART=3/10"
 	@echo "make lint       check the code: ruff, mypy, import-linter"
 	@echo "make bench      measure the solver and print tables; some of them: make bench BENCH='case-a chains'"
 	@echo "make docs       build the documentation site, reference and gallery too; it goes to site/"
@@ -38,7 +42,8 @@ help:
 setup: $(STAMP)
 
 # The first kernels are compiled while the other packages are installed: pip keeps one core busy, no more.
-# What is imported is kept as bytecode, whatever PYTHONDONTWRITEBYTECODE says: else every process reads sources.
+# What is imported meanwhile is kept as bytecode, whatever PYTHONDONTWRITEBYTECODE says: else every process
+# takes a second longer to start.
 $(PACKAGES): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 	  echo "stickslip needs Python 3.11 or newer, as in: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1; }
@@ -52,18 +57,16 @@ $(PACKAGES): pyproject.toml constraints.txt
 	@touch $@
 
 $(STAMP): $(PACKAGES)
-	$(BYTECODE)
 	@echo "Compiling the other kernels on all cores: half a minute on two, once."
-	$(BIN)/python -m service.warm_up
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m service.warm_up
 	@touch $@
 
 dev: $(DEV)
 
 $(DEV): $(PACKAGES)
-	$(BIN)/python -m service.warm_up & kernels=$$!; \
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m service.warm_up & kernels=$$!; \
 	  $(call PINNED,image dev) || { kill $$kernels; exit 1; }; \
 	  wait $$kernels
-	$(BYTECODE)
 	@touch $(STAMP) $@
 
 # The set-up is completed after it: the first optimum does not wait for what other scenes need.
@@ -75,11 +78,17 @@ demo: $(PACKAGES)
 # service also wait, and a process computes for little more than half of its time. A file is of one of them, in
 # the order of the folders: services first, at the end what is short.
 # They may write bytecode: what is read again by hundreds of processes, and the tests themselves.
-# Types are checked meanwhile: mypy keeps one core busy for most of a minute.
+TESTS := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 3 --dist loadscope --no-loadscope-reorder
+
 test: style
 	$(BIN)/python -m service.warm_up
+	$(TESTS) --tier quick $(PYTEST)
+
+# Types are checked meanwhile: mypy keeps one core busy for most of a minute.
+test-all: style
+	$(BIN)/python -m service.warm_up
 	$(BIN)/mypy & types=$$!; \
-	  PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 3 --dist loadscope --no-loadscope-reorder $(PYTEST); tests=$$?; \
+	  $(TESTS) --tier $(TIER) $(if $(COSTS),--costs) $(PYTEST); tests=$$?; \
 	  wait $$types && exit $$tests
 
 test-long: dev

@@ -17,14 +17,21 @@ import pytest
 COSTS = Path(__file__).with_name("costs.json")
 DEAR_SECONDS = 0.5
 """What costs more is left to `make test-all`."""
-FLOWS: tuple[str, ...] = ()
-"""Dear ones that are quick all the same: the page once, a killed service, a round trip to PostgreSQL."""
+FLOWS = (
+    "tests/page/test_page_answer.py::test_the_first_screen_holds_the_answer",
+    "tests/service/test_queue.py::test_a_killed_worker_costs_an_attempt_and_the_job_is_done_once",
+    "tests/service/test_postgresql.py::test_a_server_that_restarts_is_found_again",
+)
+"""Dear ones that are quick all the same: the page, a killed worker, PostgreSQL."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """All long tests take ten hours; a tenth of each function's cases, in turn, takes one."""
     parser.addoption(
-        "--tier", choices=("quick", "all"), default="all", help="quick: the first case of each cheap function"
+        "--tier",
+        choices=("quick", "rest", "all"),
+        default="all",
+        help="quick: the first case of each cheap function; rest: the others",
     )
     parser.addoption(
         "--costs", action="store_true", help="write what each function costs to tests/costs.json"
@@ -57,15 +64,17 @@ class Tiers:
     """Chooses what is collected."""
 
     def __init__(self, config: pytest.Config) -> None:
-        self.quick = config.getoption("--tier") == "quick"
+        self.tier = config.getoption("--tier")
         self.number, self.parts = config.getoption("--part") or (1, 1)
-        self.costs = recorded() if self.quick else {}
+        self.costs = recorded()
         self.of_file: dict[str, list[str]] = defaultdict(list)
         for function in self.costs:
             self.of_file[function.partition("::")[0]].append(function)
 
     def pytest_ignore_collect(self, collection_path: Path, config: pytest.Config) -> bool | None:
-        """A file all whose functions are dear is not even imported."""
+        """For the quick ones a file all whose functions are dear is not even imported."""
+        if self.tier != "quick":
+            return None
         known = self.of_file.get(collection_path.relative_to(config.rootpath).as_posix())
         return True if known and not any(is_quick(function, self.costs) for function in known) else None
 
@@ -91,8 +100,9 @@ class Tiers:
                 if (zlib.crc32(function.encode()) + dealt[function] - self.number) % self.parts:
                     left.append(item)
                 dealt[function] += 1
-            elif self.quick:
-                if function in first or not is_quick(function, self.costs):
+            elif self.tier != "all":
+                quick = function not in first and is_quick(function, self.costs)
+                if quick is not (self.tier == "quick"):
                     left.append(item)
                 first.add(function)
         if left:

@@ -123,6 +123,7 @@ def test_what_is_wrong_is_told() -> None:
         pose(scene, max_rsm=1.0)
 
 
+@pytest.mark.long
 def test_the_command_takes_its_options_and_key(tmp_path: Path, command: Callable[..., Any]) -> None:
     options = ("--variable", "damper.N0", "20", "400", "--harmonics", "3", "--json")
     bound = by_solutions(150.0)

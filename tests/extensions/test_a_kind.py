@@ -304,6 +304,7 @@ def test_an_embedded_service_has_it_and_one_without_it_keeps_what_was_stored(tmp
             service.submit("distortion", BODY)
 
 
+@pytest.mark.long
 def test_a_service_without_the_kind_fails_its_jobs_and_says_why(tmp_path: Path) -> None:
     database = {"database": f"sqlite:///{tmp_path}/jobs.db", "workers": 1}
     waiting = Service(load_settings(**database, kinds=(ENTRY,)))

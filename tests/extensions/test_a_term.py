@@ -213,6 +213,7 @@ def test_a_scene_knows_it_while_it_is_registered() -> None:
         register(SpeedDamper)
 
 
+@pytest.mark.long
 def test_the_command_solves_it(tmp_path: Path) -> None:
     (tmp_path / "oiled.json").write_text(json.dumps(SCENE))
     environment = {

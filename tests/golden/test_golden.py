@@ -31,11 +31,13 @@ def test_it_is_as_it_was(name: str, tmp_path: Path) -> None:
     assert differences((DATA / name).read_text("utf-8"), joined(FILES[name](tmp_path))) == []
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("case", CASES)
 def test_a_study_answers_as_it_did(case: Case, studies: Studies) -> None:
     assert differences(kept("studies.txt")[case.name], studies.answer(case)) == []
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("case", PRINTED)
 def test_a_study_prints_as_it_did(case: Case, studies: Studies) -> None:
     assert differences(kept("printed.txt")[case.name], studies.table(case)) == []

@@ -35,7 +35,7 @@ def scene_of(which: str) -> Scene:
     return Scene.from_dict(raw)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(6)
 @pytest.mark.parametrize("keys", KEYS.values(), ids=KEYS)
 @pytest.mark.parametrize("which", ["third harmonic", "no force", "small force"])
 def test_a_design_ends_with_a_status(which: str, keys: dict[str, Any]) -> None:

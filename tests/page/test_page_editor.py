@@ -171,6 +171,7 @@ def test_a_scene_is_drawn_up_from_nothing(profile: Profile, site: Site) -> None:
     expect(page.locator("#live-status")).to_contain_text("peak")
 
 
+@pytest.mark.long
 def test_keys_are_completed_and_the_text_is_left_by_keyboard(profile: Profile, site: Site) -> None:
     """Keys of the section one types in, words of a choice; Escape closes the list, Tab goes on."""
     page = visit(profile[0], site)

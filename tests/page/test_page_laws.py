@@ -102,6 +102,7 @@ def test_a_law_from_outside_has_sliders_and_is_designed(page_of: Any) -> None:
     assert page.input_value("#variable") == "joint.limit"
 
 
+@pytest.mark.long
 def test_every_law_has_its_sliders_and_units(page_of: Any) -> None:
     page = page_of("in-space")
     pad = ["N0", "N1", "kt", "μ", "kt_second", "kn"]

@@ -122,6 +122,7 @@ def test_files_that_do_not_fit_are_told_beside_them(profile: Profile, site: Site
     expect(page.locator("#matrix-status")).to_contain_text("`M`, the mass matrix, is missing")
 
 
+@pytest.mark.long
 def test_a_scene_that_refers_to_a_file_asks_for_it(profile: Profile, site: Site) -> None:
     """The scene alone, then its matrices; both at once; and one that is larger than the service takes."""
     buffer = io.BytesIO()

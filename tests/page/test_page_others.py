@@ -81,6 +81,7 @@ STUDIES = {
 }  # fmt: skip
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("kind", STUDIES)
 def test_a_study_is_drawn(browser: Browser, site: Site, kind: str) -> None:
     body, drawings = STUDIES[kind]

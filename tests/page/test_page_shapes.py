@@ -66,6 +66,7 @@ def turned(j: int, sectors: int, vector: list[float]) -> np.ndarray:
     return np.array(rows) @ vector
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(
     ("scene", "hertz", "dofs", "point"),
     [

@@ -31,6 +31,7 @@ def abscissa(page: Page, figure: str) -> list[str]:
     return page.locator(f"#{figure} svg.chart text.soft[text-anchor=middle]").all_text_contents()
 
 
+@pytest.mark.long
 def test_a_mode_is_followed_and_its_points_are_looked_at(profile: Profile, site: Site) -> None:
     context, watch = profile
     page = visit(context, site, "?scene=two-dof&tab=modes&harmonics=3")

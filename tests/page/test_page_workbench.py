@@ -227,6 +227,7 @@ def test_the_table_is_sorted_folded_and_told_of_what_happens(profile: Profile, s
     assert 1 <= told.count(f"/{later}/summary") <= 2, "as it begins and as it ends"
 
 
+@pytest.mark.long
 def test_a_design_with_a_scene_of_its_own_and_a_kind_without_a_view_are_opened(
     profile: Profile, site: Site
 ) -> None:

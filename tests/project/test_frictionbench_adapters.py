@@ -115,6 +115,7 @@ def test_time_and_estimate_are_not_what_an_adapter_says(tmp_path: Path) -> None:
     assert not score["covered"]
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     ("body", "failed"),
     [

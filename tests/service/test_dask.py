@@ -230,6 +230,7 @@ def test_progress_and_cancel(service: tuple[EmbeddedService, DaskCluster]) -> No
     assert processes(os.getpid) == before, "its worker heeded, it is not restarted"
 
 
+@pytest.mark.long
 def test_a_divided_job_leaves_room_for_others(service: tuple[EmbeddedService, DaskCluster]) -> None:
     """Its parts are on both workers, a small job gets between them, and a cancel ends them all."""
     embedded, _ = service

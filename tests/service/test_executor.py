@@ -126,7 +126,7 @@ def test_what_waits_behind_a_long_attempt_goes_back_to_the_queue(
     assert heard.of("long") is None, "another attempt is meant"
 
 
-@pytest.mark.few(keep=("deaf",))
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["iteration", "deaf"])
 def test_an_attempt_that_waits_can_be_stopped(executor: LocalExecutor, heard: Heard, kind: str) -> None:
     first, second, third = attempt("first", 0.15), attempt("second", 600.0, kind), attempt("third")

@@ -91,6 +91,7 @@ def test_a_model_finds_a_scene_computes_and_designs(shipped: ServedClient, tmp_p
     asked(shipped, conversation)
 
 
+@pytest.mark.long
 def test_what_is_wrong_is_said_so_that_a_model_can_mend_it(shipped: ServedClient) -> None:
     async def conversation(model: Client, ask: Ask) -> None:
         assert "two-dog" in await refused(model, "plan", scene="two-dog")

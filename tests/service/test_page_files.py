@@ -6,6 +6,7 @@ from pathlib import Path
 
 import httpx
 import pytest
+from each import each
 from service_helpers import ServedClient, is_problem
 
 from service.http import constant
@@ -88,7 +89,7 @@ def test_the_page_has_words_for_every_flag() -> None:
     assert told["not_unique"] == FLAGS["not_unique"]
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.name)
+@each(MODULES)
 def test_modules_are_short_and_put_no_data_into_markup(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert len(text.splitlines()) <= LONGEST_FILE

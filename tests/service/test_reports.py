@@ -39,6 +39,7 @@ def test_a_report_is_a_page_or_a_pdf(shipped: httpx.Client) -> None:
     is_problem(shipped.get("/v1/jobs/none/report"), 404)
 
 
+@pytest.mark.long
 def test_who_does_not_wait_is_told_when_it_is_there(shipped: httpx.Client) -> None:
     """Of the job and of its report; it is made once, and kept as it was made."""
     job = shipped.post("/v1/jobs", json={**DESIGN, "fresh": True}).json()["id"]

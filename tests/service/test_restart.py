@@ -178,7 +178,8 @@ def test_a_long_sweep_goes_on_after_every_way_to_end_a_service(
     assert process.wait(PATIENCE) == 0
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_stop_waits_for_nobody(
     port: int, start: Start, client: Client, number: signal.Signals, monkeypatch: pytest.MonkeyPatch
 ) -> None:

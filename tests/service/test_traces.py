@@ -71,6 +71,7 @@ def test_a_job_is_part_of_the_trace_of_its_request(tmp_path: Path) -> None:
     assert "secret" not in str(found)
 
 
+@pytest.mark.long
 def test_there_are_none_unless_they_are_wanted() -> None:
     """Nothing of OpenTelemetry but what FastAPI has is loaded, and nothing is carried."""
     code = (

@@ -408,6 +408,7 @@ def test_runs_of_a_time_are_found_where_the_clocks_of_machines_differ(database: 
     assert {row.id for row in runs.page(ever, 100)} == set(made)
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("counted", [0, 5000], ids=["looked at one by one", "by the index"])
 def test_texts_are_found_as_by_looking_at_every_one(
     database: Database, counted: int, monkeypatch: pytest.MonkeyPatch

@@ -64,7 +64,7 @@ SCENES = {
 }  # fmt: skip
 
 
-@pytest.mark.few(keep=("random 27",))
+@pytest.mark.long
 @pytest.mark.parametrize("name", SCENES)
 def test_a_matlab_file_is_solved_by_scipy_alone(name: str, tmp_path: Path) -> None:
     scene, hz = SCENES[name]
@@ -138,7 +138,7 @@ UNITS = SCENES | {"disk": (stickslip.load_scene("bladed-disk"), 700.0)}
 UNITS |= {f"random {seed}": random_scene(seed) for seed in range(30) if seed not in (7, 16)}  # take minutes
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(18)
 @pytest.mark.parametrize("name", UNITS)
 def test_a_unit_moves_as_the_march_does(running: Unit, name: str) -> None:
     scene, hz = UNITS[name]
@@ -206,6 +206,7 @@ def test_a_unit_follows_the_standard_and_refuses_what_is_none_of_it(running: Uni
             set_or_get()
 
 
+@pytest.mark.long
 def test_whoever_imports_the_sources_compiles_them(
     running: Unit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

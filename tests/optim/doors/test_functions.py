@@ -51,6 +51,7 @@ CASES = {
 }  # fmt: skip
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", CASES)
 def test_gradients_are_differences_of_the_answer(name: str) -> None:
     function, x, tolerance = CASES[name]

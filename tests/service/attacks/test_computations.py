@@ -76,7 +76,7 @@ LONG = {
 }  # fmt: skip
 
 
-@pytest.mark.few(8)
+@pytest.mark.few(16)
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.long if name in LONG else ()) for name in ATTACKS]
 )
@@ -131,6 +131,7 @@ def test_an_integer_of_thousands_of_digits_is_refused_with_its_place(site: Site,
     assert b"digits" in answer.body
 
 
+@pytest.mark.long
 def test_many_costly_computations_of_one_key_hurt_nobody_else(site: Site) -> None:
     """They take turns among themselves, whatever the number of connections."""
     figures = site.bears([plan(masses(600), 11)] * 3, at_once=3)

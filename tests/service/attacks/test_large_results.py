@@ -40,6 +40,7 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Besieged]:
         yield service
 
 
+@pytest.mark.long
 def test_summaries_of_a_large_result_leave_others_alone(large: Besieged) -> None:
     job = a_large_result(large, "ann", numbers(1.25))
     told: list[int] = []

@@ -37,6 +37,7 @@ def test_a_long_queue_of_one_owner_keeps_nobody_waiting(service: Besieged, numbe
         other.close()
 
 
+@pytest.mark.long
 def test_a_key_keeps_so_many_jobs_waiting(service: Besieged) -> None:
     with service.client("few") as client:
         assert client.post("/v1/jobs", json=BUSY).status_code == 202

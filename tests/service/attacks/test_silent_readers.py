@@ -34,7 +34,7 @@ def ask_and_be_silent(service: Besieged, path: str, owner: str, number: int) -> 
     return readers
 
 
-@pytest.mark.few(3)
+@pytest.mark.long
 @pytest.mark.parametrize("number", [10, 110, 200])
 def test_all_of_them_at_once_leave_others_alone(tmp_path: Path, number: int) -> None:
     """Streams, as many silent readers, and half as many again of idle connections; some are too many.

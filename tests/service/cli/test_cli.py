@@ -352,6 +352,7 @@ def test_a_pipe_gets_no_progress() -> None:
     assert "\x1b" not in done.stdout
 
 
+@pytest.mark.long
 def test_a_terminal_gets_a_progress_bar_and_a_pipe_the_result() -> None:
     master, slave = pty.openpty()
     arguments = ["sweep", "bladed-disk", "--harmonics", "15", "--json"]

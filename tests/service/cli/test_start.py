@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import pytest
+from each import each
 
 from service.cli.table import TOP, CommandEntry, CommandGroup, Deferred
 from service.jobs.kinds import studies
@@ -70,7 +71,7 @@ ENTRIES = [
 ]
 
 
-@pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: f"{entry.home} {entry.name}")
+@each(ENTRIES)
 def test_the_table_says_what_the_commands_say(entry: CommandEntry) -> None:
     """The summary in the list of commands is the first line of the command's own help."""
     text = inspect.getdoc(entry.function())

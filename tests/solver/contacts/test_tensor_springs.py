@@ -111,6 +111,7 @@ def two_springs(w1: float, w2: float) -> tuple[Array, Array]:
     return Q, C
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("hz", [0.1, 0.2, 0.3])
 def test_a_mass_on_two_springs_is_what_marching_and_scipy_give(hz: float) -> None:
     Q, C = two_springs(1.0, 1.7)

@@ -138,7 +138,7 @@ print(sum(little.doubled.stats.cache_hits.values()), sum(little.doubled.stats.ca
     assert said(python(tmp_path, check))[0] == "9 0\n"
 
 
-@pytest.mark.few(2)
+@pytest.mark.long
 @pytest.mark.parametrize("processes", [1, 2])
 def test_what_a_call_might_need_is_compiled_too(tmp_path: Path, processes: int) -> None:
     """Kernels not reached by the calls made are compiled with the rest, and what goes wrong there is said."""
@@ -167,7 +167,7 @@ if __name__ == "__main__":
     assert out.splitlines() == ["True False", "False True"]
 
 
-@pytest.mark.few(2)
+@pytest.mark.long
 @pytest.mark.parametrize("processes", [1, 2])
 def test_kernels_called_by_number_are_compiled_if_they_are_wanted(tmp_path: Path, processes: int) -> None:
     program = f"""

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 KERNEL = """
 from solver.jit.decorators import compiled
 
@@ -16,6 +18,7 @@ def outside(x: float) -> float:
 CALL = "from kernels_of_mine import outside; print(outside(3.0), sum(outside.stats.cache_hits.values()))"
 
 
+@pytest.mark.long
 def test_it_is_compiled_anew_after_its_file_changed(tmp_path: Path) -> None:
     module = tmp_path / "kernels_of_mine.py"
     root = Path(__file__).resolve().parents[3]

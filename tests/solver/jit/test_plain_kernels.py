@@ -52,7 +52,8 @@ def test_the_tests_of_the_contact_force_pass() -> None:
     assert "[100%]" in ran.stdout
 
 
-@pytest.mark.parametrize("law", ["polynomial", pytest.param("coulomb-box", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("law", ["polynomial", "coulomb-box"])
 def test_a_law_called_by_its_number_is_the_same_and_asks_for_nothing_private(law: str) -> None:
     plain, none = numbers(law, PLAIN)
     usual, some = numbers(law, {**os.environ, "STICKSLIP_PLAIN_KERNELS": "0"})

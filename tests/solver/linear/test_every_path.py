@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from body_scenes import cylinder_in_space, planar_wedge, sector_with_damper, shaped_wedge
+from each import each
 from floating_scenes import floating_scene
 from one_variable_scenes import one_variable
 from random_scenes import random_scene
@@ -62,7 +63,7 @@ def paths_of(scene: Scene) -> list[str]:
     return [path for path in paths if not path.endswith(".kn") or scene.value(path) > 0.0]
 
 
-@pytest.mark.parametrize("name", SCENES)
+@each(SCENES)
 def test_a_value_is_read_as_it_was_set(name: str) -> None:
     scene = SCENES[name]
     for path in paths_of(scene):

@@ -76,7 +76,7 @@ def test_linear_limits_have_the_multipliers_of_their_poles(name: str):
     assert found.radius == pytest.approx(np.abs(expected).max(), rel=1e-11)
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(6)
 @pytest.mark.parametrize(
     ("scene", "frequency_hz", "harmonics"),
     [
@@ -98,6 +98,7 @@ def test_matrix_against_the_marched_return_map(scene: Scene, frequency_hz: float
     np.testing.assert_allclose(found.matrix, returns.jacobian(), atol=1e-5 * np.abs(found.matrix).max())
 
 
+@pytest.mark.long
 def test_multipliers_of_the_shipped_disk_do_not_depend_on_the_harmonics():
     few, many = (stability(solve(bladed_disk(), frequency_hz=755.0, harmonics=h)) for h in (21, 81))
     assert few.neutral == many.neutral == 8

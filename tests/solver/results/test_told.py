@@ -14,6 +14,7 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 import pytest
+from each import each
 
 import optim
 import solver
@@ -131,7 +132,7 @@ def _results() -> Iterator[type[Told]]:
                     yield found
 
 
-@pytest.mark.parametrize("kind", sorted(set(_results()), key=lambda one: one.__qualname__))
+@each(set(_results()))
 def test_what_is_named_is_there(kind: type[Told]) -> None:
     """A key that is no attribute is one that `to_json` of the class gives; words are of fields."""
     assert "Annotated[" not in str(inspect.get_annotations(kind))

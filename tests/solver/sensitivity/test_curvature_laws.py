@@ -47,7 +47,7 @@ def test_the_hessian_of_a_law_equals_differences_of_the_gradient(case: str, hz: 
     assert error_of_hessian(CASES[case][0], hz, CASES[case][1]) <= 1e-6
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(6)
 @pytest.mark.parametrize("count", [1, pytest.param(40, marks=pytest.mark.long)])
 @pytest.mark.parametrize("law", CASES)
 def test_hessians_of_random_scenes_equal_differences(law: str, count: int) -> None:

@@ -94,6 +94,7 @@ def test_a_linear_scene_needs_the_first_harmonics_only():
     assert branch.balance.n_harmonics == adaptive.FIRST_HARMONICS
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     ("scene", "accuracy"), [(two_dof(), 1e-3), (two_dof(N1=200.0), 1e-2), (bladed_disk(), 1e-2)]
 )
