@@ -22,6 +22,7 @@ import numpy as np
 
 from solver.arrays import Real
 from solver.balance.balance import Balance, build
+from solver.balance.rounding import resonates_undamped
 from solver.balance.simplifications import even_harmonics_reason
 from solver.balance.whole_motion import Amplitudes
 from solver.balance.workspace import Workspace
@@ -204,6 +205,8 @@ def respond(
     looks: list[_LongPeriods] = []
     limits = [turns // 2**i for i in range(int(math.log2(turns / LEAST_TURNS)) + 1)][::-1]
     status, change = QuasiPeriodicStatus.NOT_CONVERGED, math.nan
+    if question.undamped():
+        status, limits = QuasiPeriodicStatus.UNDAMPED, []
     for number, limit in enumerate(limits):
         if should_stop is not None and should_stop():
             status = QuasiPeriodicStatus.STOPPED
@@ -275,8 +278,13 @@ class Question:
     harmonics: int
 
     def look(self, limit: int, start: _ContactMotions | None) -> _LongPeriods | None:
-        """Solve for the ratios next to that of the frequencies; None where one has no solution or none is."""
+        """Solve for the ratios next to that of the frequencies; None where one has no solution or none is.
+
+        Nor is there one between two ratios on either side of a resonance that nothing damps.
+        """
         ratios = list(self._ratios(limit))
+        if len(ratios) == 2 and self._meets_undamped(*(self.first_hz * q / p for p, q in ratios)):
+            return None
         solved = [self._solved(p, q, start) for p, q in ratios]
         found = [each for each, _ in solved]
         if not found or not all(each.converged for each in found):
@@ -294,6 +302,17 @@ class Question:
             sizes = sizes + share * np.diff(sizes, axis=0)
         motions = solved[nearest][1] or start
         return _LongPeriods(torus, sizes[0], tuple(ratios), found[nearest], exact, motions)
+
+    def undamped(self) -> bool:
+        """Return whether a force meets a resonance that nothing damps, at which no response has a size."""
+        omega = 2.0 * math.pi * self.first_hz
+        first = resonates_undamped(build(self.scene, harmonics=self.harmonics), omega, omega)
+        return first or self._meets_undamped(self.second_hz, self.second_hz)
+
+    def _meets_undamped(self, low_hz: float, high_hz: float) -> bool:
+        """Return the same of the second force alone, with a frequency anywhere between two."""
+        alone = build(self.scene.model_copy(update={"excitation": (self.second,)}), harmonics=1)
+        return resonates_undamped(alone, 2.0 * math.pi * low_hz, 2.0 * math.pi * high_hz)
 
     def _ratios(self, limit: int) -> Iterator[tuple[int, int]]:
         """Turns p and q of the two with q/p next below and above the ratio, or equal to it.
