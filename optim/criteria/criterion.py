@@ -141,8 +141,10 @@ class Criterion:
 
     def limit_words(self, row: CriterionRow) -> str:
         """Return the limit of a row in words."""
-        bound = row.bound_told if row.bound_told is None or self.smaller_is_better else 0.0 - row.bound_told
-        where = f" ({row.what})" if self.with_place else ""
+        where, bound = f" ({row.what})" if self.with_place else "", row.bound_told
+        if bound is None:
+            return f"an end to the {self.name}{where}"
+        bound = bound if self.smaller_is_better else 0.0 - bound
         return f"{self.limit_name or f'{self.name} limit'} of {bound:g} {self.unit}{where}"
 
 

@@ -82,7 +82,10 @@ def _case(
         if there is not None and shared:
             branch = there
             if there.reached:
-                branch = observing(there, here.observe.dof, measure=here.observe.measure, limit=problem.limit)
+                branch = observing(
+                    there, here.observe.dof, measure=here.observe.measure, limit=problem.limit,
+                    errors=errors,
+                )  # fmt: skip
         else:
             branch = sweep(
                 here, start=over.low, stop=over.high, harmonics=problem.harmonics, limit=problem.limit,

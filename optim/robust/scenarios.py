@@ -227,7 +227,7 @@ def _of_all_blades(
         if not branch.reached:
             return [], len(ranges)
         for j, dof in enumerate(blades):
-            seen = branch if j == 0 else observing(branch, dof, limit=problem.limit)
+            seen = branch if j == 0 else observing(branch, dof, limit=problem.limit, errors=False)
             judge = Judge(
                 problem=problem, case=replace(case, name=f"{case.name}, {dof}"), gradients=gradients
             )

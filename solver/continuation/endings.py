@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from solver.balance.kernels.residual import evaluate
+from solver.balance.rounding import amplitudes
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import KT
+from solver.contacts.kernels.system import evaluation_by_value
 from solver.continuation.kernels import state as walk_states
 from solver.continuation.kernels.pseudo_arclength import begin_walk
 from solver.continuation.kernels.state import Control, walk_by_value
 from solver.jit.fourier import Real
+from solver.linear.modal import undamped_resonance
 
 STIFFEST = 1e7
 NEIGHBOUR = 0.05  # largest change of the vibration, relative, over which a branch is taken up again
 MANY, NEAR, STILL = 24, 1e-7, 1e-3  # points within such shares of the range and of the motion lead nowhere
+_MOVES = 1e-6  # share of the largest amplitude of a contact, of harmonics with which one moves
 AHEAD = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # of the range, where it is looked why a branch went no further
 
 
@@ -30,6 +35,26 @@ def too_stiff(workspace: Workspace, first: float, last: float) -> bool:
     system = workspace.balance.system
     kt = system.contacts[system.owner, KT]
     return bool(np.any(A * kt > STIFFEST))
+
+
+def ends_undamped(workspace: Workspace, points: Real, start: float) -> bool:
+    """Return whether a branch over the frequency ends, or cannot begin, near a resonance without damping.
+
+    The last of its points tells what contacts hold of the motion that has grown.
+    """
+    balance, held = workspace.balance, None
+    p = float(points[-1, -1]) if len(points) else start
+    if len(points):
+        u = points[-1, :-1].copy()
+        evaluate(workspace.system, workspace.linear, u, p, 0.0, workspace.point)
+        F = evaluation_by_value(workspace.point).F
+        moves = balance.system.ks > 0
+        pairs = amplitudes(balance.system, u.reshape(F.shape)), amplitudes(balance.system, F)
+        motions, forces = (each[:, moves].T for each in pairs)
+        seen = np.abs(motions) > _MOVES * np.abs(motions).max(initial=0.0)
+        held = np.where(seen, (forces / np.where(seen, motions, 1.0)).real, 0.0)
+    at_hz = float(balance.parameter.outside(p))
+    return undamped_resonance(balance.scene, at_hz, balance.system.ks, held)
 
 
 def stands_still(points: Real, control: Control) -> bool:

@@ -264,15 +264,19 @@ def _plain_poles(
 _NEAR = 0.02  # relative to a natural frequency
 
 
-def undamped_resonance(scene: Scene, frequency_hz: float, harmonics: NDArray[np.int64]) -> bool:
+def undamped_resonance(
+    scene: Scene, frequency_hz: float, harmonics: NDArray[np.int64], held: Real | None = None
+) -> bool:
     """Return whether nothing damps the structure, and a harmonic is near one of its natural frequencies.
 
-    Those with all contacts open count, and those with all of them stuck. Friction takes out power in
-    proportion to the amplitude, a resonance puts it in so too: above some force no amplitude balances them.
+    Those with all contacts open count, those with all of them stuck, and those of a motion: a gap or a
+    nonlinear spring holds more or less of it by the amplitude. Friction takes out power in proportion to the
+    amplitude, a resonance puts it in so too: above some force no amplitude balances them.
 
     Parameters
     ----------
     harmonics : those kept.
+    held : what contacts hold each harmonic above 0 of their motions with [N/m], (nk, n_ports).
     """
     model = linear_model(scene)
     ks = harmonics[harmonics > 0]
@@ -280,10 +284,14 @@ def undamped_resonance(scene: Scene, frequency_hz: float, harmonics: NDArray[np.
         return False
     diameters, kt = model.diameters(ks), port_stiffnesses(scene, model)
     matrices = model.at(diameters, np.ones(ks.size, np.bool_))
-    for k, K, C, M, L in zip(ks.tolist(), *matrices, model.ports_at(diameters), strict=True):
+    springs = np.stack([0.0 * kt, kt] if held is None else [0.0 * kt, kt, held[0]])
+    for i, (k, K, C, M, L) in enumerate(zip(ks.tolist(), *matrices, model.ports_at(diameters), strict=True)):
         if np.any(hermitian(C)) or np.any(K - hermitian(K)):
             return False
-        for stiffness in (K, K + L.conj().T @ (kt[:, None] * L)):
+        if held is not None:
+            springs[-1] = held[i]
+        for each in springs:
+            stiffness = K + L.conj().T @ (each[:, None] * L)
             omega2 = undamped_modes(hermitian(stiffness), hermitian(M)).omega2
             natural = np.sqrt(np.maximum(omega2, 0.0)) / (2.0 * math.pi)
             if np.any(np.abs(k * frequency_hz - natural) <= _NEAR * natural):

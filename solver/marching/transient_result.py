@@ -22,7 +22,8 @@ class TransientStatus(Enum):
         "give more steps per period, or a larger tolerance."
     )
     NOT_SETTLED = (
-        "The motion at the first frequency does not repeat: begin from rest, or at another frequency."
+        "The motion at the first frequency does not repeat, and without damping none does: begin from rest, "
+        "at another frequency, or give the structure some (damping_ratio = 0.001, say)."
     )
     STOPPED = "Stopped on request: what was run through until then."
     CHATTER = (

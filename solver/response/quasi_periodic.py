@@ -21,17 +21,17 @@ from typing import Any
 import numpy as np
 
 from solver.arrays import Real
-from solver.balance.balance import Balance, build
+from solver.balance.balance import build
+from solver.balance.rounding import resonates_undamped
 from solver.balance.simplifications import even_harmonics_reason
-from solver.balance.whole_motion import Amplitudes
 from solver.balance.workspace import Workspace
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.errors import SettingError
-from solver.jit import fourier
-from solver.jit.fourier import Complex, Flags, Integer
+from solver.jit.fourier import Integer
 from solver.response.quasi_periodic_result import LINES, QuasiPeriodic, QuasiPeriodicStatus
 from solver.response.solution import MEAN_UNDETERMINED, Solution
 from solver.response.solve import describe, solve
+from solver.response.torus import NOWHERE, ContactMotions, Torus, sizes_on, torus_of
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.excitation import Excitation
 from solver.scene.harmonics import MOST_HARMONICS
@@ -41,85 +41,19 @@ from solver.scene.scene import Scene
 LEAST_TURNS = 12  # of the first look; each further one has twice as many
 _EXACT = 1e-12  # relative: a ratio this near to one of whole numbers is that ratio
 _SAFETY = 2.0  # fitted to random scenes against marches of very long periods
-_GRID = 256  # angles of a turn at which the extremes are compared
 _SECTION = 240  # points of the section
-
-
-@dataclass(frozen=True, slots=True)
-class _Torus:
-    """A motion x(θ₁, θ₂) = mean + Re Σ c exp(i (k θ₁ + l θ₂)), n sums."""
-
-    k: Integer
-    l: Integer  # noqa: E741 (the letter of the field)
-    c: Complex
-    mean: float
-
-    def at(self, first: Real, second: Real) -> Real:
-        """Return x at pairs of angles, (m,)."""
-        waves = np.exp(1j * (np.outer(first, self.k) + np.outer(second, self.l)))
-        return np.asarray(self.mean + (waves @ self.c).real)
-
-    def low(self, turns: tuple[int, int]) -> Flags:
-        """Return of which waves a curve of so many turns tells what they are beside it, (n,)."""
-        return np.abs(self.k) + np.abs(self.l) <= sum(turns) // 4
-
-    def sizes(self) -> Real:
-        """Return max|x| and (max x - min x) / 2 of all its waves on an even grid of both angles."""
-        grid = np.zeros((_GRID, _GRID), complex)
-        np.add.at(grid, (self.k % _GRID, self.l % _GRID), self.c)
-        x = self.mean + np.fft.ifft2(grid).real * grid.size
-        return np.array([np.abs(x).max(), 0.5 * np.ptp(x)])
-
-    def beside(self, other: _Torus, share: float) -> _Torus:
-        """Return the motion between this one (share 0) and another one (share 1)."""
-        found: dict[tuple[int, int], complex] = {}
-        for each, weight in ((self, 1.0 - share), (other, share)):
-            for k, l, c in zip(each.k.tolist(), each.l.tolist(), each.c.tolist(), strict=True):  # noqa: E741
-                found[k, l] = found.get((k, l), 0.0) + weight * c
-        k, l = np.array(list(found), np.int64).reshape(-1, 2).T  # noqa: E741
-        mean = (1.0 - share) * self.mean + share * other.mean
-        return _Torus(k, l, np.array(list(found.values()), np.complex128), mean)
-
-
-_NOWHERE = _Torus(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0, np.complex128), math.nan)
-
-
-@dataclass(frozen=True, slots=True)
-class _ContactMotions:
-    """The slip motions of a long period as waves on the torus, from which another one can begin."""
-
-    k: Integer
-    l: Integer  # noqa: E741 (the letter of the field)
-    u: Complex  # (nc, n) amplitudes
-
-    @classmethod
-    def of(cls, u: Real, balance: Balance, p: int, q: int) -> _ContactMotions:
-        """Return those of unknowns (n_unknowns,) of p and q turns."""
-        ks = balance.system.ks
-        k, l = _sums(ks, p, q, int(ks[-1]) + 1)  # noqa: E741
-        return cls(k, l, Amplitudes(balance).of(u.reshape(-1, balance.n_coefficients)))
-
-    def guess(self, balance: Balance, p: int, q: int) -> Real:
-        """Return the unknowns of p and q turns: waves whose sum is no harmonic kept are left out."""
-        amplitudes = Amplitudes(balance)
-        place = {n: i for i, n in enumerate(balance.system.ks.tolist())}
-        found = np.zeros((len(self.u), len(place)), np.complex128)
-        for n, c in zip((self.k * p + self.l * q).tolist(), self.u.T, strict=True):
-            if abs(n) in place:
-                found[:, place[abs(n)]] += c if n >= 0 else c.conj()
-        return amplitudes.coefficients(found).reshape(-1)
 
 
 @dataclass(frozen=True, slots=True)
 class _LongPeriods:
     """What periods of at most so many turns tell."""
 
-    torus: _Torus
+    torus: Torus
     sizes: Real
     turns: tuple[tuple[int, int], ...]
     nearest: Solution
     repeats: bool
-    motions: _ContactMotions | None
+    motions: ContactMotions | None
 
     def measures(self) -> Real:
         """Return max|x|, (max x - min x) / 2, root mean square and the amplitudes of the two tones."""
@@ -196,14 +130,16 @@ class TorusWatch:
 
 
 def respond(
-    question: Question, turns: int, tolerance: float, start: _ContactMotions | None, watch: TorusWatch,
+    question: Question, turns: int, tolerance: float, start: ContactMotions | None, watch: TorusWatch,
     began: float,
-) -> tuple[QuasiPeriodic, _ContactMotions | None]:  # fmt: skip
+) -> tuple[QuasiPeriodic, ContactMotions | None]:  # fmt: skip
     """Answer a question, from a motion known to be near; return what another one can begin with, too."""
     on_progress, should_stop = watch.on_progress, watch.should_stop
     looks: list[_LongPeriods] = []
     limits = [turns // 2**i for i in range(int(math.log2(turns / LEAST_TURNS)) + 1)][::-1]
     status, change = QuasiPeriodicStatus.NOT_CONVERGED, math.nan
+    if question.undamped():
+        status, limits = QuasiPeriodicStatus.UNDAMPED, []
     for number, limit in enumerate(limits):
         if should_stop is not None and should_stop():
             status = QuasiPeriodicStatus.STOPPED
@@ -274,26 +210,42 @@ class Question:
     second_hz: float
     harmonics: int
 
-    def look(self, limit: int, start: _ContactMotions | None) -> _LongPeriods | None:
-        """Solve for the ratios next to that of the frequencies; None where one has no solution or none is."""
+    def look(self, limit: int, start: ContactMotions | None) -> _LongPeriods | None:
+        """Solve for the ratios next to that of the frequencies; None where one has no solution or none is.
+
+        Nor is there one between two ratios on either side of a resonance that nothing damps.
+        """
         ratios = list(self._ratios(limit))
+        if len(ratios) == 2 and self._meets_undamped(*(self.first_hz * q / p for p, q in ratios)):
+            return None
         solved = [self._solved(p, q, start) for p, q in ratios]
         found = [each for each, _ in solved]
         if not found or not all(each.converged for each in found):
             return None
         wanted = self.second_hz / self.first_hz
         off = [q / p - wanted for p, q in ratios]
-        tori = [_torus(each, *turns) for each, turns in zip(found, ratios, strict=True)]
+        tori = [torus_of(each, *turns) for each, turns in zip(found, ratios, strict=True)]
         nearest = int(np.argmin(np.abs(off)))
         exact = abs(off[nearest]) <= _EXACT * wanted
         pairs = list(zip(found, tori, ratios, strict=True))
-        torus, sizes = tori[0], np.array([_sizes(*each, repeats=exact) for each in pairs])
+        torus, sizes = tori[0], np.array([sizes_on(*each, repeats=exact) for each in pairs])
         if len(tori) == 2:
             share = off[0] / (off[0] - off[1])
             torus = torus.beside(tori[1], share)
             sizes = sizes + share * np.diff(sizes, axis=0)
         motions = solved[nearest][1] or start
         return _LongPeriods(torus, sizes[0], tuple(ratios), found[nearest], exact, motions)
+
+    def undamped(self) -> bool:
+        """Return whether a force meets a resonance that nothing damps, at which no response has a size."""
+        omega = 2.0 * math.pi * self.first_hz
+        first = resonates_undamped(build(self.scene, harmonics=self.harmonics), omega, omega)
+        return first or self._meets_undamped(self.second_hz, self.second_hz)
+
+    def _meets_undamped(self, low_hz: float, high_hz: float) -> bool:
+        """Return the same of the second force alone, with a frequency anywhere between two."""
+        alone = build(self.scene.model_copy(update={"excitation": (self.second,)}), harmonics=1)
+        return resonates_undamped(alone, 2.0 * math.pi * low_hz, 2.0 * math.pi * high_hz)
 
     def _ratios(self, limit: int) -> Iterator[tuple[int, int]]:
         """Turns p and q of the two with q/p next below and above the ratio, or equal to it.
@@ -338,8 +290,8 @@ class Question:
         return self.scene.model_copy(update={"excitation": excitation, "contacts": contacts})
 
     def _solved(
-        self, p: int, q: int, start: _ContactMotions | None, *, estimated: bool = False
-    ) -> tuple[Solution, _ContactMotions | None]:
+        self, p: int, q: int, start: ContactMotions | None, *, estimated: bool = False
+    ) -> tuple[Solution, ContactMotions | None]:
         """Solve the balance of p and q turns, from motions known to be near."""
         scene, base, highest = self._at(p, q), self.first_hz / p, self.harmonics * max(p, q)
         begun = time.perf_counter()
@@ -350,14 +302,14 @@ class Question:
             found = solve_from_nothing(workspace, 2.0 * math.pi * base)
         if not found.converged:
             return solve(scene, frequency_hz=base, harmonics=highest), None
-        motions = _ContactMotions.of(found.u, workspace.balance, p, q)
+        motions = ContactMotions.of(found.u, workspace.balance, p, q)
         return describe(workspace, found, base, begun, estimated=estimated), motions
 
     def answer(
         self, looks: list[_LongPeriods], status: QuasiPeriodicStatus, change: float, began: float
     ) -> QuasiPeriodic:
         """Read the result off the last look; what the harmonics left out do, off the first and shortest."""
-        torus, sizes, section = _NOWHERE, np.full(5, math.nan), np.empty(0)
+        torus, sizes, section = NOWHERE, np.full(5, math.nan), np.empty(0)
         turns: tuple[tuple[int, int], ...] = ()
         if looks:
             look, shortest = looks[-1], self._solved(*looks[0].turns[0], looks[0].motions, estimated=True)[0]
@@ -367,7 +319,7 @@ class Question:
             section = q * np.arange(p) / p % 1.0 if look.repeats else np.linspace(0.0, 1.0, _SECTION)
         angle, still = 2.0 * math.pi * section, np.zeros(section.size)
         hertz = torus.k * self.first_hz + torus.l * self.second_hz
-        moving = _Torus(torus.k, torus.l, 2j * math.pi * hertz * torus.c, 0.0)
+        moving = Torus(torus.k, torus.l, 2j * math.pi * hertz * torus.c, 0.0)
         top = np.argsort(-np.abs(torus.c))[:LINES]
         max_abs, half, rms, first, second = sizes.tolist()
         return QuasiPeriodic(
@@ -381,41 +333,3 @@ class Question:
             flags=looks[-1].nearest.flags if looks else (), n_harmonics=self.harmonics,
             error_estimate=change, seconds=time.perf_counter() - began,
         )  # fmt: skip
-
-
-def _torus(found: Solution, p: int, q: int) -> _Torus:
-    """Read the motion of p and q turns as one on the torus: each harmonic is the sum of the least order."""
-    amplitudes = fourier.to_complex(found.observed)
-    n = np.flatnonzero(amplitudes)
-    n = n[n > 0]
-    return _Torus(*_sums(n, p, q, amplitudes.size), amplitudes[n], float(amplitudes[0].real))
-
-
-def _sums(n: Integer, p: int, q: int, count: int) -> tuple[Integer, Integer]:
-    """Return k and l of the sums k p + l q of least order that are harmonics n below `count`, (m,) each."""
-    inverse = pow(q, -1, p) if p > 1 else 0
-    reach = math.ceil(count / (p * q)) + 1
-    every = (n * inverse % p)[:, None] + p * np.arange(-reach, reach + 1)
-    firsts = (n[:, None] - every * q) // p
-    best = np.argmin(np.abs(every) + np.abs(firsts), axis=1)
-    rows = np.arange(n.size)
-    return firsts[rows, best], every[rows, best]
-
-
-def _sizes(found: Solution, torus: _Torus, turns: tuple[int, int], *, repeats: bool) -> tuple[float, float]:
-    """Return max|x| and half peak to peak on the torus, of what they are on the curve of a long period.
-
-    The curve passes by the places where waves of low orders are largest together: by how much those are
-    larger on the torus than on the curve is known of these waves, on even grids.
-    """
-    if repeats:
-        return found.max_abs, found.half_peak_to_peak
-    low = torus.low(turns)
-    k, l, c = torus.k[low], torus.l[low], torus.c[low]  # noqa: E741
-    grid, line = np.zeros((_GRID, _GRID), complex), np.zeros(_GRID * max(turns), complex)
-    np.add.at(grid, (k % _GRID, l % _GRID), c)
-    np.add.at(line, k * turns[0] + l * turns[1], c)
-    everywhere, along = np.fft.ifft2(grid).real * grid.size, np.fft.ifft(line).real * line.size
-    above, below = max(everywhere.max() - along.max(), 0.0), max(along.min() - everywhere.min(), 0.0)
-    upward = torus.mean + everywhere.max() >= -torus.mean - everywhere.min()
-    return found.max_abs + (above if upward else below), found.half_peak_to_peak + 0.5 * (above + below)

@@ -24,6 +24,10 @@ class QuasiPeriodicStatus(Enum):
     NOT_CONVERGED = (
         "No response was found: allow more `turns`, more harmonics, or change a frequency a little."
     )
+    UNDAMPED = (
+        "At one of the two frequencies there is a resonance and no damping, so that nothing bounds the "
+        "response: give the structure some (damping_ratio = 0.001, say)."
+    )
     STOPPED = "Stopped on request: what was known until then."
 
 

@@ -81,10 +81,9 @@ def haigh_of(scene: Any, name: str) -> Haigh:
 
 def utilisation_of(counted: float) -> float:
     """Return the utilisation that a search counts as so much; inf where the mean stress leaves nothing."""
-    if counted <= STEEP:
-        return counted
-    margin = (2.0 - counted / STEEP) / STEEP
-    return 1.0 / margin if margin > 0.0 else math.inf
+    if counted >= ENDLESS:
+        return math.inf
+    return counted if counted <= STEEP else STEEP / (2.0 - counted / STEEP)
 
 
 def counted(utilisation: float) -> float:

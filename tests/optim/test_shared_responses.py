@@ -56,6 +56,9 @@ def test_a_search_by_another_measure_computes_no_design_again() -> None:
     named = replace(first, responses=(replace(first.responses[0], case=problem.cases[0].name),))
     again = evaluate(problem, values, gradients=False, before=named)
     assert again.computed == 0
+    searched = evaluate(problem, values, gradients=False, errors=False, before=named)
+    assert math.isnan(searched.branch.error_estimate)  # a search does without: it costs as much as a response
+    assert searched.with_errors().branch.error_estimate == again.branch.error_estimate
     assert again.objective == pytest.approx(evaluate(problem, values, gradients=False).objective, rel=1e-9)
 
 

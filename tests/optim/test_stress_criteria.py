@@ -50,6 +50,7 @@ def test_values_are_the_highest_of_dense_responses(line: str, static: float) -> 
     found = evaluate(pose(scene, variables=VARIABLES, weights=BOTH, harmonics=HARMONICS), DESIGN)
     stress = next(row for row in found.of(STRESS) if "fillet" in row.what)
     utilisation = next(row for row in found.of(UTILISATION) if "fillet" in row.what)
+    assert utilisation.bound_told is None, "that there is an end to it is no limit asked for"
     grid = np.unique([*np.linspace(0.5, 2.2, 60), *(stress.at_hz + np.linspace(-2e-3, 2e-3, 41))])
     seen = np.array([of_time(scene, hertz) for hertz in grid])
     assert stress.value == pytest.approx(1e6 * seen[:, 0].max(), rel=2e-6)

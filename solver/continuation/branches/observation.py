@@ -29,7 +29,7 @@ from solver.scene.materials import Haigh
 
 def observing(
     branch: Branch, dof: str, *, measure: str | Haigh | None = None, limit: float | None = None,
-    peaks_alone: bool = False,
+    peaks_alone: bool = False, errors: bool = True,
 ) -> Branch:  # fmt: skip
     """Return a frequency response observed otherwise: the same solutions, its own peaks and band.
 
@@ -44,6 +44,7 @@ def observing(
         stress by what it is judged by, `solver.scene.materials.haigh_of`.
     limit : amplitude [m] above which the band is measured; peak/√2 if left out.
     peaks_alone : leave out the band and the error of the highest peak.
+    errors : estimate that error; `with_error` does it later if not.
 
     Raises
     ------
@@ -64,7 +65,9 @@ def observing(
             with_points(seen, survey.points), peaks=survey.peaks, band=None,
             peak_certificate=survey.certificate(completed=branch.reached),
         )  # fmt: skip
-    found = with_error(surveyed(seen, survey, limit), workspace)
+    found = surveyed(seen, survey, limit)
+    if errors:
+        found = with_error(found, workspace)
     return replace(found, seconds=time.perf_counter() - begun)
 
 

@@ -25,7 +25,7 @@ from solver.continuation.branches.adaptive_harmonics import sweep_to
 from solver.continuation.branches.point_by_point import is_unique, rows_before_a_turn, walk_by_points
 from solver.continuation.branches.symmetry_breaking import branch_flags
 from solver.continuation.certificate import uncertain
-from solver.continuation.endings import AHEAD, too_stiff
+from solver.continuation.endings import AHEAD, ends_undamped, too_stiff
 from solver.continuation.extrema.branch_error import branch_error
 from solver.continuation.extrema.extrema import Survey, band_limit
 from solver.continuation.from_nothing import solve_from_nothing
@@ -39,7 +39,6 @@ from solver.continuation.stretches import BranchStretches, control_of, ending
 from solver.continuation.walk import walk as along
 from solver.errors import SettingError
 from solver.jit.fourier import Real, to_full
-from solver.linear.modal import undamped_resonance
 from solver.results.notes import ABOVE_FRICTION
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.bodies.paths import SPEED
@@ -256,12 +255,12 @@ def _finish(
     """Put the stretches together; with `peaks` polish these and measure the band."""
     balance = workspace.balance
     whole = joined(stretches)
-    if status in (BranchStatus.STALLED, BranchStatus.NO_START) and balance.parameter.kind is Kind.FREQUENCY:
-        at_end = balance.parameter.outside(float(whole.solutions[-1, -1])) if len(whole.solutions) else start
-        if undamped_resonance(balance.scene, at_end, balance.system.ks):
-            status = BranchStatus.UNDAMPED
     inside = balance.parameter.inside
-    if resonates_undamped(balance, inside(start), inside(stop)):
+    lost = status in (BranchStatus.STALLED, BranchStatus.NO_START)
+    lost = lost and balance.parameter.kind is Kind.FREQUENCY
+    if resonates_undamped(balance, inside(start), inside(stop)) or (
+        lost and ends_undamped(workspace, whole.solutions, inside(start))
+    ):
         status = BranchStatus.UNDAMPED
     peaks = peaks and status is not BranchStatus.UNDAMPED
     branch = replace(

@@ -82,9 +82,10 @@ class ErrorEstimator:
     the first order misses. Harmonic by harmonic the change goes up and down, and its sum may come out near
     zero by accident: so a step by the residual of the nearer of the harmonics added is looked at too.
     Where the second step is long, as where a stiff contact stops the motion for a while, that balance is
-    solved at fixed λ and its change counts instead; if no solution is found, the difference from the one with
-    half of the harmonics, if that is less. The estimate is the largest change of the amplitude, at least a
-    tenth of the change of the motion at its worst instant, times `SAFETY`.
+    solved at fixed λ and its change counts instead; if no solution is found, from that motion or from
+    nothing, the difference from the one with half of the harmonics, if that is less. The estimate is the
+    largest change of the amplitude, at least a tenth of the change of the motion at its worst instant, times
+    `SAFETY`.
 
     Harmonics still beyond are added with coefficients that fall like 1/k², as those of a force with kinks do,
     weighted by the receptance of the structure with the mean stiffness of its contacts, so that a resonance
@@ -210,11 +211,14 @@ class ErrorEstimator:
         return None if after is None else _Step(place, length, self._change(x, after))
 
     def _solved(self, x: _Seen, U: Real, p: float, largest: Real) -> Real:
-        """Return the changes of a motion to the solution with more harmonics near U, or else with fewer.
+        """Return the changes of a motion to the solution with more harmonics, or else to that with fewer.
 
-        The latter are about those of twice the harmonics, if not more; they count if below `largest`.
+        From U on it may not be found where a harmonic added meets a resonance, but from nothing. The latter
+        are about those of twice the harmonics, if not more; they count if below `largest`.
         """
         found = self._larger.solve_from(p, U)
+        if not found.converged:
+            found = self._larger.solve(p)
         wider = self._motion(self._larger, found.u, p) if found.converged else None
         if wider is not None:
             return np.array(self._change(x, wider))
