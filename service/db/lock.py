@@ -16,7 +16,8 @@ if sys.platform == "win32":
     # Windows locks are mandatory: one byte far behind the text leaves the holder's number readable.
     _LOCKED_BYTE = 1 << 20
 
-    def _try_lock(file: IO[Any]) -> bool:
+    def try_lock(file: IO[Any]) -> bool:
+        """Lock an open file until it is closed, unless another process has done so: whether it is ours."""
         file.seek(_LOCKED_BYTE)
         try:
             msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
@@ -27,7 +28,7 @@ if sys.platform == "win32":
 else:
     import fcntl
 
-    def _try_lock(file: IO[Any]) -> bool:
+    def try_lock(file: IO[Any]) -> bool:
         try:
             fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -86,7 +87,7 @@ class FileLock:
             file = self._path.open("a+", encoding="utf-8")
         except OSError as error:
             raise DatabaseError(f"cannot use {self._database}: {error}") from error
-        if not _try_lock(file):
+        if not try_lock(file):
             file.seek(0)
             holder = file.read(32).strip() or "unknown"
             file.close()
@@ -117,7 +118,7 @@ class FileLock:
             if which in _held:
                 raise self._in_use(str(os.getpid()))
             file = self._database.open("rb")
-            if not _try_lock(file):
+            if not try_lock(file):
                 file.close()
                 raise self._in_use("unknown")
             _held.add(which)
