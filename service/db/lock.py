@@ -16,24 +16,28 @@ if sys.platform == "win32":
     # Windows locks are mandatory: one byte far behind the text leaves the holder's number readable.
     _LOCKED_BYTE = 1 << 20
 
-    def try_lock(file: IO[Any]) -> bool:
-        """Lock an open file until it is closed, unless another process has done so: whether it is ours."""
+    _TAKEN: type[OSError] = OSError
+
+    def _lock(file: IO[Any]) -> None:
         file.seek(_LOCKED_BYTE)
-        try:
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-        except OSError:
-            return False
-        return True
+        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
 
 else:
     import fcntl
 
-    def try_lock(file: IO[Any]) -> bool:
-        try:
-            fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return False
-        return True
+    _TAKEN: type[OSError] = BlockingIOError
+
+    def _lock(file: IO[Any]) -> None:
+        fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def try_lock(file: IO[Any]) -> bool:
+    """Lock an open file until it is closed, unless another process has: whether it is ours."""
+    try:
+        _lock(file)
+    except _TAKEN:
+        return False
+    return True
 
 
 # Files that this process has locked, by device and inode.
