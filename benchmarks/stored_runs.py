@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 import statistics
 import tempfile
@@ -11,11 +12,14 @@ from contextlib import ExitStack
 from datetime import datetime, timedelta
 from functools import partial
 from os import environ
+from pathlib import Path
 from typing import Any
 
 from sqlalchemy import insert, text
 
 from benchmarks.harness import expect, table
+from benchmarks.service_process import serving
+from benchmarks.service_requests import beside, key_of, table_of
 from benchmarks.service_workers import own_postgresql
 from service.db import revisions
 from service.db.clock import utc_now
@@ -76,6 +80,32 @@ def stored_runs() -> None:
             slowest.append((f"median of {len(times)}", statistics.median(times.values())))
             rows += [(backend, name, f"{1e3 * seconds:.1f} ms") for name, seconds in slowest]
     table(f"A page of 100 of {runs} runs, the slowest lists", ("database", "list", "time"), rows)
+
+
+_SEARCHES = (
+    "/v1/runs?limit=100", "/v1/runs?text=shroud&limit=100", "/v1/runs?text=turbofan", "/v1/runs?text=qq",
+    "/v1/runs?tag=review&tag=accepted", "/v1/runs?kind=march&status=failed", "/v1/jobs?limit=100",
+    "/v1/runs?scene=own%20blade&kind=march", "/v1/runs?deleted=true",
+)  # fmt: skip
+_LOOKING = 4
+
+
+def searches() -> None:
+    """Another owner's requests while two keys list and search RUNS stored runs over four connections each."""
+    runs, rows = int(environ.get("RUNS", "200000")), []
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        new_database = stack.enter_context(own_postgresql())
+        for backend, url in (("SQLite", f"sqlite:///{folder}/jobs.db"), ("PostgreSQL", new_database())):
+            fill(url, runs)
+            most, few, other = (key_of(url, owner) for owner in (_OWNER, "owner 3", "another"))
+            with serving(url, workers=1, log=folder / "log", require_keys="true") as service:
+                with service.client() as client:
+                    for path, key in itertools.product(_SEARCHES, (most, few)):
+                        expect(f"{path}: not answered 200", client.get(path, key).status == 200)
+                looking = [(_LOOKING, _SEARCHES, key) for key in (most, few)]
+                rows.append(beside(service, other, f"two keys at {runs} runs, {backend}", *looking))
+    table_of(rows)
 
 
 def timed(url: str, first: datetime) -> dict[str, float]:
