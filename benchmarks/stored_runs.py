@@ -98,13 +98,14 @@ def searches() -> None:
         new_database = stack.enter_context(own_postgresql())
         for backend, url in (("SQLite", f"sqlite:///{folder}/jobs.db"), ("PostgreSQL", new_database())):
             fill(url, runs)
-            most, few, other = (key_of(url, owner) for owner in (_OWNER, "owner 3", "another"))
+            most, few, other = (key_of(url, owner) for owner in (_OWNER, "owner-3", "another"))
             with serving(url, workers=1, log=folder / "log", require_keys="true") as service:
                 with service.client() as client:
                     for path, key in itertools.product(_SEARCHES, (most, few)):
                         expect(f"{path}: not answered 200", client.get(path, key).status == 200)
                 looking = [(_LOOKING, _SEARCHES, key) for key in (most, few)]
                 rows.append(beside(service, other, f"two keys at {runs} runs, {backend}", *looking))
+            print(*rows[-1], flush=True)
     table_of(rows)
 
 
@@ -159,7 +160,7 @@ def _queries(first: datetime) -> Iterator[tuple[str, str | None, RunQuery]]:
         some[f"before {share:.1%}, text nowhere"] = {"created_before": when, "text": "turbofan"}
         some[f"before {share:.1%}, two tags"] = {"created_before": when, "tag": ["rig", "stage 3"]}
     for name, words in some.items():
-        for sees, whose in ((_OWNER, "most"), ("owner 3", "few"), (None, "all")):
+        for sees, whose in ((_OWNER, "most"), ("owner-3", "few"), (None, "all")):
             yield f"{name}, {whose}", sees, RunQuery(**words)  # type: ignore[arg-type]
 
 
@@ -167,7 +168,7 @@ def _run(chance: random.Random, created: datetime) -> tuple[list[dict[str, Any]]
     """Rows of the tables of a run."""
     [kind] = chance.choices(_KINDS, _KIND_SHARES)
     [state] = chance.choices(_STATES, _STATE_SHARES)
-    owner = _OWNER if chance.random() < 0.6 else f"owner {chance.randrange(_OTHERS)}"
+    owner = _OWNER if chance.random() < 0.6 else f"owner-{chance.randrange(_OTHERS)}"
     row_id = _id(chance, created)
     scene = chance.choice(_SCENES)
     job = {

@@ -25,6 +25,8 @@ from service.db.repositories.integrity import check
 from tests.golden.faces import rounded
 
 KILLS = 30
+SECONDS = 1800.0
+"""For all of them to end."""
 EACH = 10
 """Jobs handed in before a kill."""
 
@@ -88,7 +90,7 @@ def test_kills_with_jobs_of_every_kind(url: str, tmp_path: Path) -> None:
     with serving(calm, workers=2, log=tmp_path / "calm") as service:
         wanted: dict[str, str] = {}
         hand_in(service, deque((f"calm-{number}", case) for number, case in enumerate(BODIES)), wanted)
-        until(lambda: ended(service), seconds=300.0)
+        until(lambda: ended(service), seconds=SECONDS)
     undisturbed = {wanted[job]: one for job, one in outcomes(calm).items()}
     assert {one.attempt for one in undisturbed.values()} == {1}
 
@@ -113,7 +115,7 @@ def test_kills_with_jobs_of_every_kind(url: str, tmp_path: Path) -> None:
         done = {job: one for job, one in before.items() if one.state.finished}
     with serving(url, workers=2, log=tmp_path / "log", **settings) as service:
         hand_in(service, waiting, accepted)
-        until(lambda: ended(service), seconds=300.0)
+        until(lambda: ended(service), seconds=SECONDS)
     found = outcomes(url)
     print(f"{KILLS} kills, {len(accepted)} jobs accepted, when they happened {dict(left)}, "  # noqa: T201
           f"{sum(interrupted.values())} times anew")  # fmt: skip
