@@ -10,8 +10,10 @@ from solver.results.views import on_demand
 
 GROUPS = {
     "chains": ("chain-8", "chain-32", "one-slider"),
-    "service": ("load", "latency", "requests", "doors", "lists", "runs", "figures", "workers", "scale"),
-}
+    "service": (
+        "load", "latency", "requests", "doors", "lists", "runs", "searches", "figures", "workers", "scale",
+    ),
+}  # fmt: skip
 CASES = {
     "responses": "responses:responses",
     "solves": "responses:solves",
@@ -48,6 +50,7 @@ CASES = {
     "latency": "service_load:latency",
     "lists": "service_load:lists",
     "runs": "stored_runs:stored_runs",
+    "searches": "stored_runs:searches",
     "requests": "service_requests:requests",
     "doors": "service_requests:doors",
     "pruning": "service_pruning:pruning",

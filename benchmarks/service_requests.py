@@ -13,6 +13,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.harness import expect, table
@@ -99,28 +100,26 @@ def doors() -> None:
     with tempfile.TemporaryDirectory() as name:
         log, database = Path(name) / "log", f"sqlite:///{name}/jobs.db"
         with serving(database, workers=1, log=log, require_keys="true") as service:
-            ann, bob = (_key(database, owner) for owner in ("ann", "bob"))
+            ann, bob = (key_of(database, owner) for owner in ("ann", "bob"))
             with service.client() as client:
                 for path in _CONSTANT:
                     client.get(path, ann)  # the first time, for which it is made
                 costs = [(path, *(_cost(service, client, path, ann + more) for more in ("", _GZIP)))
                          for path in _CONSTANT]  # fmt: skip
-            rows = [_beside(service, bob, f"{_FLOODS} × {path}", (_FLOODS, path, "")) for path in _CONSTANT]
-            rows.append(_beside(service, bob, f"{_STREAMS} streams", (_STREAMS, "/v1/runs/events", ann)))
+            rows = [beside(service, bob, f"{_FLOODS} × {path}", (_FLOODS, (path,), "")) for path in _CONSTANT]
+            rows.append(beside(service, bob, f"{_STREAMS} streams", (_STREAMS, ("/v1/runs/events",), ann)))
         logged = log.stat().st_size
     table(
         "Processor time of the service for a constant answer, wanted 2 ms",
         ("route", "plain", "compressed"),
         costs,
     )
-    table(
-        f"Another owner's GET /v1/jobs, and the jobs that were accepted, beside others in {_SECONDS:g} s",
-        ("beside", "p50", "p99", "control p50", "p99", "jobs", "control"), rows,
-    )  # fmt: skip
+    table_of(rows)
     print(f"The log of all that has {logged / 1e6:.1f} MB.")
 
 
-def _key(database: str, owner: str) -> str:
+def key_of(database: str, owner: str) -> str:
+    """A new key of an owner, as the header that has it."""
     opened, limits = Database(database), KeyLimits(requests_per_minute=1_000_000)
     try:
         made = create(KeyRepository(opened), owner, [Scope.SUBMIT], utc_now(), None, limits)
@@ -137,28 +136,45 @@ def _cost(service: ServiceProcess, client: LightClient, path: str, headers: str,
     return f"{1e3 * service.cpu().since(before).service / requests:.2f} ms"
 
 
-def _beside(service: ServiceProcess, key: str, words: str, others: tuple[int, str, str]) -> tuple[str, ...]:
-    """Times of who looks and jobs of who hands in, beside others and alone in the same minute."""
-    attack = mp.get_context("spawn").Process(target=_ask, args=(service.port, *others), daemon=True)
+def beside(
+    service: ServiceProcess, key: str, words: str, *others: tuple[int, Sequence[str], str]
+) -> tuple[str, ...]:
+    """A row of `table_of`: of who looks and who hands in, beside others and alone in the same minute.
+
+    Each of the others is a process with so many connections that ask for these paths with these headers.
+    """
+    spawn = mp.get_context("spawn")
+    attacks = [spawn.Process(target=_ask, args=(service.port, *other), daemon=True) for other in others]
     alone = _at_work(service, key)
-    attack.start()
+    for attack in attacks:
+        attack.start()
     time.sleep(2.0)
-    beside = _at_work(service, key)
-    attack.terminate()
-    attack.join()
+    found = _at_work(service, key)
+    for attack in attacks:
+        attack.terminate()
+        attack.join()
     time.sleep(1.0)
-    ms = [f"{1e3 * one:.0f} ms" for one in (*beside[:2], *alone[:2])]
-    return (words, *ms, str(beside[2]), str(alone[2]))
+    ms = [f"{1e3 * one:.0f} ms" for one in (*found[:2], *alone[:2])]
+    return (words, *ms, str(found[2]), str(alone[2]))
 
 
-def _ask(port: int, connections: int, path: str, headers: str) -> None:
+def table_of(rows: Sequence[tuple[str, ...]]) -> None:
+    """Print what another owner met."""
+    table(
+        f"Another owner's GET /v1/jobs, and the jobs that were accepted, beside others in {_SECONDS:g} s",
+        ("beside", "p50", "p99", "control p50", "p99", "jobs", "control"), rows,
+    )  # fmt: skip
+
+
+def _ask(port: int, connections: int, paths: Sequence[str], headers: str) -> None:
     """The process of those who ask again and again, or read what has no end, and of what comes nothing."""
-    request = f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n{headers}\r\n".encode()
+    end = f"HTTP/1.1\r\nHost: 127.0.0.1\r\n{headers}\r\n"
+    asked = itertools.cycle([f"GET {path} {end}".encode() for path in paths])
 
     async def one() -> None:
         reader, writer = await asyncio.open_connection("127.0.0.1", port)
         while True:
-            writer.write(request)
+            writer.write(next(asked))
             head = (await reader.readuntil(b"\r\n\r\n")).decode().lower()
             if "content-length:" in head:
                 await reader.readexactly(int(head.partition("content-length:")[2].split()[0]))

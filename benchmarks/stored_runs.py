@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 import statistics
 import tempfile
@@ -11,11 +12,14 @@ from contextlib import ExitStack
 from datetime import datetime, timedelta
 from functools import partial
 from os import environ
+from pathlib import Path
 from typing import Any
 
 from sqlalchemy import insert, text
 
 from benchmarks.harness import expect, table
+from benchmarks.service_process import serving
+from benchmarks.service_requests import beside, key_of, table_of
 from benchmarks.service_workers import own_postgresql
 from service.db import revisions
 from service.db.clock import utc_now
@@ -78,6 +82,33 @@ def stored_runs() -> None:
     table(f"A page of 100 of {runs} runs, the slowest lists", ("database", "list", "time"), rows)
 
 
+_SEARCHES = (
+    "/v1/runs?limit=100", "/v1/runs?text=shroud&limit=100", "/v1/runs?text=turbofan", "/v1/runs?text=qq",
+    "/v1/runs?tag=review&tag=accepted", "/v1/runs?kind=march&status=failed", "/v1/jobs?limit=100",
+    "/v1/runs?scene=own%20blade&kind=march", "/v1/runs?deleted=true",
+)  # fmt: skip
+_LOOKING = 4
+
+
+def searches() -> None:
+    """Another owner's requests while two keys list and search RUNS stored runs over four connections each."""
+    runs, rows = int(environ.get("RUNS", "200000")), []
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        new_database = stack.enter_context(own_postgresql())
+        for backend, url in (("SQLite", f"sqlite:///{folder}/jobs.db"), ("PostgreSQL", new_database())):
+            fill(url, runs)
+            most, few, other = (key_of(url, owner) for owner in (_OWNER, "owner-3", "another"))
+            with serving(url, workers=1, log=folder / "log", require_keys="true") as service:
+                with service.client() as client:
+                    for path, key in itertools.product(_SEARCHES, (most, few)):
+                        expect(f"{path}: not answered 200", client.get(path, key).status == 200)
+                looking = [(_LOOKING, _SEARCHES, key) for key in (most, few)]
+                rows.append(beside(service, other, f"two keys at {runs} runs, {backend}", *looking))
+            print(*rows[-1], flush=True)
+    table_of(rows)
+
+
 def timed(url: str, first: datetime) -> dict[str, float]:
     """The least time [s] of three of a page, for every list."""
     database, settings, times = Database(url), load_settings(), {}
@@ -129,7 +160,7 @@ def _queries(first: datetime) -> Iterator[tuple[str, str | None, RunQuery]]:
         some[f"before {share:.1%}, text nowhere"] = {"created_before": when, "text": "turbofan"}
         some[f"before {share:.1%}, two tags"] = {"created_before": when, "tag": ["rig", "stage 3"]}
     for name, words in some.items():
-        for sees, whose in ((_OWNER, "most"), ("owner 3", "few"), (None, "all")):
+        for sees, whose in ((_OWNER, "most"), ("owner-3", "few"), (None, "all")):
             yield f"{name}, {whose}", sees, RunQuery(**words)  # type: ignore[arg-type]
 
 
@@ -137,7 +168,7 @@ def _run(chance: random.Random, created: datetime) -> tuple[list[dict[str, Any]]
     """Rows of the tables of a run."""
     [kind] = chance.choices(_KINDS, _KIND_SHARES)
     [state] = chance.choices(_STATES, _STATE_SHARES)
-    owner = _OWNER if chance.random() < 0.6 else f"owner {chance.randrange(_OTHERS)}"
+    owner = _OWNER if chance.random() < 0.6 else f"owner-{chance.randrange(_OTHERS)}"
     row_id = _id(chance, created)
     scene = chance.choice(_SCENES)
     job = {

@@ -19,14 +19,7 @@ _PAUSES = (0.1, 0.2, 0.4)
 class Transport:
     """Sends requests; a connection that fails is tried again, so every request must be safe to repeat.
 
-    Parameters
-    ----------
-    base_url : str
-        For example ``http://127.0.0.1:8000``.
-    timeout : float
-        Time one request may take [s].
-    key : str, optional
-        A key to the service, where it needs one.
+    Parameters are those of `Client`.
     """
 
     def __init__(self, base_url: str, timeout: float, key: str | None = None) -> None:

@@ -16,23 +16,28 @@ if sys.platform == "win32":
     # Windows locks are mandatory: one byte far behind the text leaves the holder's number readable.
     _LOCKED_BYTE = 1 << 20
 
-    def _try_lock(file: IO[Any]) -> bool:
+    _TAKEN: type[OSError] = OSError
+
+    def _lock(file: IO[Any]) -> None:
         file.seek(_LOCKED_BYTE)
-        try:
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-        except OSError:
-            return False
-        return True
+        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
 
 else:
     import fcntl
 
-    def _try_lock(file: IO[Any]) -> bool:
-        try:
-            fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return False
-        return True
+    _TAKEN: type[OSError] = BlockingIOError
+
+    def _lock(file: IO[Any]) -> None:
+        fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def try_lock(file: IO[Any]) -> bool:
+    """Lock an open file until it is closed, unless another process has: whether it is ours."""
+    try:
+        _lock(file)
+    except _TAKEN:
+        return False
+    return True
 
 
 # Files that this process has locked, by device and inode.
@@ -86,7 +91,7 @@ class FileLock:
             file = self._path.open("a+", encoding="utf-8")
         except OSError as error:
             raise DatabaseError(f"cannot use {self._database}: {error}") from error
-        if not _try_lock(file):
+        if not try_lock(file):
             file.seek(0)
             holder = file.read(32).strip() or "unknown"
             file.close()
@@ -117,7 +122,7 @@ class FileLock:
             if which in _held:
                 raise self._in_use(str(os.getpid()))
             file = self._database.open("rb")
-            if not _try_lock(file):
+            if not try_lock(file):
                 file.close()
                 raise self._in_use("unknown")
             _held.add(which)

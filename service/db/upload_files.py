@@ -22,12 +22,15 @@ from sqlalchemy import Connection, delete, insert, select
 from service.db.array_store import to_disk
 from service.db.clock import earliest_id
 from service.db.engine import database_path, files_beside, is_sqlite
+from service.db.lock import try_lock
 from service.db.models import Upload, UploadPiece
 from service.errors import DatabaseAwayError, NotFoundError
 
 PIECE_BYTES = 1 << 20
 WORK = "stickslip-work-"
 """Begins the names of folders that `UploadFiles.work` makes."""
+_HELD = "held"
+"""A file in each of them, which is locked as long as who made it lives."""
 _LEFT = timedelta(days=1)
 """Longer than anything takes to arrive and to be read."""
 
@@ -64,7 +67,13 @@ class UploadFiles:
         try:
             if self._folder is not None:
                 self._folder.mkdir(mode=0o700, exist_ok=True)
-            with tempfile.TemporaryDirectory(prefix=WORK, dir=self._folder) as folder:
+            with (
+                tempfile.TemporaryDirectory(prefix=WORK, dir=self._folder) as folder,
+                Path(folder, _HELD).open("w", encoding="utf-8") as held,
+            ):
+                try_lock(held)
+                held.write(f"{os.getpid()}\n")  # what is not written yet may not be locked yet
+                held.flush()
                 yield Path(folder)
         except OSError as error:
             if error.errno not in (errno.ENOSPC, errno.EDQUOT):
@@ -126,11 +135,11 @@ class UploadFiles:
                 connection.execute(delete(UploadPiece).where(UploadPiece.upload_id.in_(uploads)))
 
     def sweep(self, now: datetime) -> None:
-        """Delete what a crash left: it is old, and no row names it."""
+        """Delete what a crash left: whose maker has ended, or it is old and no row names it."""
         before = (now - _LEFT).timestamp()
         for path in (self._folder or Path(tempfile.gettempdir())).glob(f"{WORK}*"):
             with suppress(FileNotFoundError):  # it ends at this moment
-                if path.stat().st_mtime < before:
+                if _nobodys(path, before):
                     shutil.rmtree(path, ignore_errors=True)
         if self._folder is None:
             left = delete(UploadPiece).where(
@@ -146,3 +155,11 @@ class UploadFiles:
             for path in old:
                 if path.name not in named and not path.is_dir():
                     path.unlink(missing_ok=True)
+
+
+def _nobodys(folder: Path, before: float) -> bool:
+    """Whether who made a folder of `work` has ended; of one that does not tell, whether it is old."""
+    with suppress(FileNotFoundError, PermissionError), (folder / _HELD).open("r+b") as held:
+        if held.read():
+            return try_lock(held)
+    return folder.stat().st_mtime < before

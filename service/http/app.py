@@ -11,6 +11,7 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 from starlette.concurrency import run_in_threadpool
+from starlette.types import Receive, Scope, Send
 
 from service.auth.authenticator import Authenticator
 from service.errors import ConfigurationError
@@ -45,15 +46,18 @@ log = logging.getLogger("stickslip.service")
 _DESCRIPTION = "Designs friction dampers: jobs, their results, and every frequency response computed."
 
 
+class _App(FastAPI):
+    """An application whose layers see requests alone: its begin and end pass by them."""
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request through all layers."""
+        await (super().__call__ if scope["type"] == "http" else self.router)(scope, receive, send)
+
+
 def create_app(settings: Settings | None = None, registry: Registry | None = None) -> FastAPI:
     """The application of one service; its lifespan starts and stops database, queue and workers.
 
-    Parameters
-    ----------
-    settings : Settings, optional
-        Its settings; from the environment if not given.
-    registry : Registry, optional
-        The kinds of job; those shipped and those of the setting `kinds` if not given.
+    Parameters are those of `EmbeddedService`.
     """
     service = Service(settings or load_settings(), registry)
 
@@ -66,7 +70,7 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
         finally:
             await run_in_threadpool(service.stop)
 
-    app = FastAPI(
+    app = _App(
         title="stickslip",
         description=_DESCRIPTION,
         version=SOLVER_VERSION,

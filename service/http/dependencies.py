@@ -401,7 +401,7 @@ class HostCheck:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request on, or answer it with a problem."""
-        if scope["type"] == "http" and "*" not in self._hosts:
+        if "*" not in self._hosts:
             request = Request(scope, receive)
             host = re.sub(r":\d+$", "", request.headers.get("host", "").lower())
             if host not in self._hosts:

@@ -43,19 +43,7 @@ _MOST_LOOKED_UP = 8
 
 
 async def computed(context: Context, task: str, words: Mapping[str, Any], about: str = "scene") -> Any:
-    """What a task of `service.jobs.answering` finds.
-
-    Parameters
-    ----------
-    about : the field that makes it costly.
-
-    Raises
-    ------
-    InvalidRequestError, MalformedBodyError, BodyTooLargeError
-        What the task refuses; what takes more time or memory than an answer may.
-    TooManyRequestsError, QueueFullError
-        If the budget of the caller is used up, or too many wait.
-    """
+    """What a task of `service.jobs.answering` finds; `Answers.ask` has `about` and the errors."""
     service, caller = context.service, context.caller
     source = service.scenes.of(caller)
     spec: dict[str, Any] = {"words": words, "scenes": {}, "uploads": {}}

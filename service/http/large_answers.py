@@ -53,7 +53,7 @@ class InPieces:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request on; its answer comes in pieces."""
         connection: Connection | None = scope.get("state", {}).get(KEY)
-        if scope["type"] != "http" or connection is None:
+        if connection is None:
             await self._app(scope, receive, send)
             return
 

@@ -99,9 +99,6 @@ class RequestMetrics:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on and watch its answer."""
-        if scope["type"] != "http":
-            await self._app(scope, receive, send)
-            return
         begun, status = time.perf_counter(), 500
 
         async def watched(message: Message) -> None:

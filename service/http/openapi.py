@@ -69,7 +69,7 @@ def install(app: FastAPI, registry: Registry) -> None:
         return described
 
     app.openapi = openapi  # type: ignore[method-assign]
-    app.state.description = Constant(lambda: json.dumps(openapi()).encode())
+    app.state.description = Constant(lambda: json.dumps(openapi(), separators=(",", ":")).encode())
     app.state.reference = reference(openapi)
     app.include_router(router)
 

@@ -97,10 +97,7 @@ def work(settings: Settings, registry: Registry | None = None, *, until_empty: b
     until_empty : bool
         End when no job waits or runs.
 
-    Raises
-    ------
-    DatabaseError
-        If the database cannot be used; `DatabaseInUseError` if a service has it.
+    `Service.open` lists the errors.
     """
     logs.configure(settings.log_level, settings.log_format)
     stop = threading.Event()

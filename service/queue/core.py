@@ -89,6 +89,8 @@ class WholeDesign:
 class Service:
     """Database, queue and workers of one service.
 
+    What it is asked for by an id is a NotFoundError where there is none that the caller may see.
+
     Parameters
     ----------
     settings : Settings
@@ -292,23 +294,11 @@ class Service:
         return asked if asked is not None else of_key
 
     def job(self, job_id: str, caller: Caller = KEYLESS) -> JobRow:
-        """The job.
-
-        Raises
-        ------
-        NotFoundError
-            If there is none of this id that the caller may see.
-        """
+        """The job."""
         return visible(self.jobs.get(job_id), caller.sees, f"there is no job {job_id!r}")
 
     def sweep(self, sweep_id: str, caller: Caller = KEYLESS) -> SweepRecord:
-        """A stored sweep.
-
-        Raises
-        ------
-        NotFoundError
-            If there is none of this id that the caller may see.
-        """
+        """A stored sweep."""
         found: SweepRecord | None = self.stored.get(sweep_id, SWEEP)
         return visible(found, caller.sees, f"there is no sweep {sweep_id!r}")
 
@@ -322,8 +312,6 @@ class Service:
 
         Raises
         ------
-        NotFoundError
-            If there is none of this id that the caller may see.
         ConflictError
             If it ended before.
         """
@@ -345,7 +333,7 @@ class Service:
         Raises
         ------
         NotFoundError
-            If there is no such job, or it has no scene.
+            If it has no scene.
         """
         scene: dict[str, Any] | None = self.jobs.spec(self.job(job_id, caller).id).get("scene")
         if scene is None:
@@ -357,8 +345,6 @@ class Service:
 
         Raises
         ------
-        NotFoundError
-            If there is no such job.
         ConflictError
             If it has not ended, or was dismissed.
         JobFailedError
@@ -377,13 +363,7 @@ class Service:
         raise ConflictError(f"job {job_id} is {row.state.value}, it has no results yet")
 
     def design(self, design_id: str, caller: Caller = KEYLESS) -> WholeDesign:
-        """A stored design; the id of a later job that asked for the same names it too.
-
-        Raises
-        ------
-        NotFoundError
-            If there is none of this id that the caller may see.
-        """
+        """A stored design; the id of a later job that asked for the same names it too."""
         missing = f"there is no design {design_id!r}"
         asked = visible(self.jobs.get(design_id), caller.sees, missing)
         job = asked if asked.result_of is None else self.jobs.get(asked.result_of)

@@ -237,11 +237,11 @@ class _Boundary:
             await self._app(scope, receive, watch)
         except asyncio.CancelledError:
             # The server cancels what has not ended when its grace is over, and answers 500 to it by itself.
-            if began or scope["type"] != "http":
+            if began:
                 raise
             await _ended_with_the_service(Request(scope))(scope, receive, send)
         except Exception as error:
-            if began or scope["type"] != "http":
+            if began:
                 raise
             await _unexpected(Request(scope), error)(scope, receive, send)
 

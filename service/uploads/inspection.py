@@ -80,7 +80,7 @@ def resolved_structure(
     InvalidRequestError
         With pointers into the scene.
     UnreadableUploadError
-        If reading takes too much.
+        If a file cannot be read, or reading takes too much.
     """
     scene = {"structure": dict(structure), "excitation": [{"engine_order": order} for order in orders]}
     found: dict[str, Any] = _ask(_RESOLVE, folder, scene, seconds, most_bytes)
@@ -90,12 +90,7 @@ def resolved_structure(
 def look_at(asked: Mapping[str, Any], folder: Path, seconds: float, most_bytes: int) -> dict[str, Any]:
     """What files in `folder` hold and are good for, as `service.uploads.matrix_summary.look` says.
 
-    Raises
-    ------
-    InvalidRequestError
-        With pointers into the scene that is asked for.
-    UnreadableUploadError
-        If a file cannot be read, or it takes too much.
+    Errors are those of `resolved_structure`.
     """
     found: dict[str, Any] = _ask(_LOOK, folder, dict(asked), seconds, most_bytes)
     return found

@@ -104,23 +104,11 @@ class Uploads:
         return rows
 
     def get(self, upload_id: str, caller: Caller = KEYLESS) -> Upload:
-        """An upload.
-
-        Raises
-        ------
-        NotFoundError
-            If there is none of this id that the caller may see.
-        """
+        """An upload (NotFoundError if there is none of this id that the caller may see)."""
         return visible(self.repository.get(upload_id), caller.sees, f"there is no upload {upload_id!r}")
 
     def delete(self, upload_id: str, caller: Caller = KEYLESS) -> None:
-        """Forget an upload; scenes and jobs that were made with it keep what it held.
-
-        Raises
-        ------
-        NotFoundError
-            If there is none of this id.
-        """
+        """Forget an upload (errors as of `get`); scenes and jobs that were made with it keep what it held."""
         row = self.get(upload_id, caller)
         self.repository.delete(upload_id)
         self.storage.forget(row.owner)
@@ -188,13 +176,7 @@ class Uploads:
             raise InvalidRequestError.of((key, at), error.detail, named=False, source=source) from error
 
     def _rows(self, structure: Mapping[str, Any], caller: Caller) -> dict[Place, Upload]:
-        """The uploads a structure names, by their places.
-
-        Raises
-        ------
-        InvalidRequestError
-            One that is not there; a file that is named in another way.
-        """
+        """The uploads a structure names, by their places, or all that is wrong with its references."""
         rows, issues = {}, []
         for place, given in named_files(structure).items():
             key = place[-1]

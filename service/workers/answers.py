@@ -44,17 +44,7 @@ _WITHOUT_MEMORY = ("SIGABRT", "SIGSEGV", "SIGBUS")
 
 
 class Answers(WarmPool):
-    """Computes answers.
-
-    Parameters
-    ----------
-    runs : mapping
-        The function of each task; sent to the processes by name.
-    warm_up : callable
-        Called in every process before it takes a task; sent by name.
-    settings : Settings
-        What may be computed.
-    """
+    """Computes answers, as far as the settings let it; further parameters are those of `WarmPool`."""
 
     def __init__(self, runs: Mapping[str, RunOn], warm_up: WarmUp, settings: Settings) -> None:
         super().__init__(

@@ -35,7 +35,7 @@ BEGUN = b"HTTP/1.1 200"
 _WINDOW = 100
 _WINDOWS = 8
 _IDLE_WINDOW = 40
-_START_SECONDS = 120.0
+_START_SECONDS = 300.0
 
 
 @dataclass
@@ -183,7 +183,7 @@ def _until_up(service: Besieged, seconds: float) -> None:
             return
         if service.process.poll() is not None or time.monotonic() > end:
             pytest.fail(f"the service does not come up:\n{service.log()[-3000:]}")
-        time.sleep(0.05)
+        time.sleep(0.2)
 
 
 def submitted(service: Besieged, owner: str) -> str:

@@ -1,17 +1,25 @@
 """Clocks that jump or disagree cost no job an attempt."""
 
 import random
+import threading
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
+from email.utils import parsedate_to_datetime
+from pathlib import Path
 
+import httpx
 import pytest
+from besieged import besieged, running
 from private_kinds import PRIVATE
+from serve_private import CLOCK
 from service_helpers import PATIENCE, settings_of, until
+from sqlalchemy import select
 
+from service.auth.callers import KeyLimits
 from service.db.clock import SharedClock, utc_now
 from service.db.engine import Database
-from service.db.models import JobState
+from service.db.models import JobState, Result
 from service.db.repositories import JobRepository
 from service.queue.core import Service
 
@@ -89,3 +97,75 @@ def test_machines_whose_clocks_disagree_leave_each_other_their_jobs(
         finally:
             first.stop()
             second.stop()
+
+
+class SetClock:
+    """The clock of a process, which is set by hours while it runs."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+        self.set(0)
+
+    def set(self, hours: int) -> None:
+        """Set it so many hours ahead of what is right."""
+        new = self.file.with_suffix(".new")
+        new.write_text(f"{hours}")
+        new.replace(self.file)
+
+    def jump(self, over: threading.Event) -> None:
+        """Set it anew six times a second."""
+        generator = random.Random(1)
+        while not over.wait(0.15):
+            self.set(generator.choice([-11, -3, -1, 0, 1, 3, 11]))
+
+
+@pytest.mark.long
+def test_the_clock_of_a_service_is_set_by_hours_while_it_works(
+    url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Leases, limits of time, `Prefer: wait`, `Retry-After` and the order of jobs are as ever."""
+    clock = SetClock(tmp_path / "clock")
+    monkeypatch.setenv(CLOCK, str(clock.file))
+    limits = {"bob": KeyLimits(requests_per_minute=30)}
+    body = {"kind": "iteration", "sweeps": 1, "fresh": True}
+    with (
+        besieged(tmp_path, "ann", "bob", url=url, limits=limits, lease_seconds=3.0) as service,
+        service.client("ann") as client,
+    ):
+        clock.set(5)
+        until(lambda: abs(_ahead(client) - 5.0) < 0.1, seconds=10.0)
+        with running(clock.jump):
+            made = [client.post("/v1/jobs", json={**body, "seconds": 0.4, "seed": n}) for n in range(12)]
+            jobs = [answer.raise_for_status().json()["id"] for answer in made]
+            limited = {**body, "seconds": 60.0, "max_seconds": 1.0, "priority": 5}
+            waited = {"Prefer": "wait=1"}
+            begun = time.monotonic()
+            last = client.post("/v1/jobs", json=limited, headers=waited).raise_for_status().json()
+            assert 1.0 <= time.monotonic() - begun < 5.0
+            until(lambda: client.get(f"/v1/jobs/{jobs[-1]}").json()["finished"], seconds=60.0)
+            with service.client("bob") as other:
+                while (refused := other.get("/v1/kinds")).status_code != 429:
+                    assert refused.status_code == 200
+                assert 1 <= int(refused.headers["Retry-After"]) <= 60
+                time.sleep(int(refused.headers["Retry-After"]))
+                assert other.get("/v1/kinds").status_code == 200
+        late = client.get(f"/v1/jobs/{last['id']}").json()
+        assert late["status"] == "failed"
+        assert "1 s" in late["error"]["detail"], late
+        told = [client.get(f"/v1/jobs/{job}").json() for job in jobs]
+        assert [(one["status"], one["attempt"]) for one in told] == [("successful", 1)] * len(jobs)
+        listed = [one["id"] for one in client.get("/v1/jobs?limit=100").json()["items"]]
+        assert listed == [last["id"], *reversed(jobs)]
+        service.terminate()
+    database = Database(url)
+    with database.reading() as connection:
+        query = select(Result.job_id).where(Result.of == "sweep").order_by(Result.number)
+        stored = connection.execute(query).scalars().all()
+    database.close()
+    assert stored == jobs, "by one worker, one after the other"
+
+
+def _ahead(client: httpx.Client) -> float:
+    """How far the clock of a service is ahead of this one [h]."""
+    told = parsedate_to_datetime(client.get("/health/live").headers["Date"])
+    return (told - utc_now()).total_seconds() / 3600.0

@@ -25,6 +25,7 @@ VALUES: list[float] = [
 SECONDS = 0.1
 """After so long what is computed is told to stop: what goes wrong for a number does so at once."""
 PATH = ("damper.N0", 100.0)
+MEASURED = {"frequency": [1.0, 1.2], "amplitude": [1.93, 1.77]}
 BASE: dict[str, dict[str, Any]] = {
     "sweep": {"from": 0.9, "to": 1.3},
     "map": {"parameter": PATH[0], "from": 50, "to": 100, "steps": 2, "frequencies": 3, "ridge": False},
@@ -48,12 +49,13 @@ BASE: dict[str, dict[str, Any]] = {
         "scene": "bladed-disk", "of": ["tip"], "contacts": "stuck", "starts": 1, "climbs": 0, "climb": 0,
     },
     "identify": {
-        "unknowns": {"damper.mu": [0.1, 0.6]}, "starts": 1,
-        "data": [{"frequency": [1.0, 1.2], "amplitude": [1.93, 1.77], "conditions": {PATH[0]: 100.0}}],
+        "unknowns": {"damper.mu": [0.1, 0.6]}, "starts": 1, "priors": {"damper.mu": [0.3, 0.1]},
+        "candidates": {PATH[0]: [80.0, 90.0]},
+        "data": [{**MEASURED, "conditions": {PATH[0]: 100.0}, "phase": [-0.3, -0.9]}],
     },
     "posterior": {
-        "unknowns": {"damper.mu": [0.1, 0.6]}, "starts": 1, "draws": 100,
-        "data": [{"frequency": [1.0, 1.2], "amplitude": [1.93, 1.77], "conditions": {PATH[0]: 100.0}}],
+        "unknowns": {"damper.mu": [0.1, 0.6]}, "starts": 1, "draws": 100, "priors": {"damper.mu": [0.3, 0.1]},
+        "data": [{**MEASURED, "conditions": {PATH[0]: 100.0}, "sd": [0.01, 0.02]}],
     },
     "modes": {"mode": 1, "from": 0.9, "to": 1.0},
     "controlled": {"amplitude": 1.0, "from": 1.0, "to": 1.1, "no_stability": True},
@@ -61,6 +63,14 @@ BASE: dict[str, dict[str, Any]] = {
     "plan": {},
 }  # fmt: skip
 """A cheap request of each kind."""
+OTHERWISE: dict[str, dict[str, Any]] = {
+    "posterior": {
+        "priors": None,
+        "models": {"b": {"scene": "two-dof", "set": {PATH[0]: 90.0}, "unknowns": {"damper.kt": [2e3, 9e3]}}},
+    },
+    "worst-mistuning": {"contacts": "solved", "harmonics": 1, "set": {"shroud.N0": 500.0}},
+}
+"""What some of them have in another case."""
 
 Place = tuple[str | int, ...]
 
@@ -110,7 +120,9 @@ def further(name: str, schema: Mapping[str, Any], body: Mapping[str, Any]) -> It
 def places(kind: str) -> list[tuple[Place, dict[str, Any]]]:
     """Every place of a number in requests of a kind, with a body that has it."""
     body, schema = body_of(kind), SHIPPED[kind].request.model_json_schema()
+    other = OTHERWISE.get(kind, {})
     found = [(place, body) for place in numbers(body)]
+    found += [(place, {**body, **other}) for place in numbers(other)]
     for name, one in schema["properties"].items():
         found += [(place, {**body, name: value}) for place, value in further(name, one, body)]
     return found

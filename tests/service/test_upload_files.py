@@ -2,6 +2,9 @@
 
 import hashlib
 import os
+import subprocess
+import sys
+import tempfile
 import time
 import tracemalloc
 from datetime import timedelta
@@ -100,6 +103,38 @@ def test_a_crash_leaves_too_much_and_that_is_swept(database: Database) -> None:
         os.utime(abandoned, (time.time() - 1e5,) * 2)
         uploads.files.sweep(utc_now())
         assert kept(database) == {row.id}
+
+
+_WORKS = """
+import os, signal, sys
+from service.db.engine import Database
+from service.db.repositories import UploadRepository
+with UploadRepository(Database(sys.argv[1])).files.work() as folder:
+    (folder / "file").write_bytes(b"x")
+    print(folder, flush=True)
+    sys.stdin.read()
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_the_folder_of_a_process_that_was_killed_goes_at_once(
+    database: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that is in use stays, whatever the clock says."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    files = UploadRepository(database).files
+    command = [sys.executable, "-c", _WORKS, database.url]
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
+    ) as process:
+        assert process.stdout is not None
+        folder = Path(process.stdout.readline().strip())
+        files.sweep(utc_now() + timedelta(days=2))
+        assert (folder / "file").exists()
+        process.communicate("")
+    files.sweep(utc_now() - timedelta(days=2))
+    assert not folder.exists()
 
 
 def test_what_an_older_version_stored_is_moved_and_moved_back(url: str) -> None:

@@ -33,7 +33,7 @@ class HeadAsGet:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request on."""
-        if scope["type"] != "http" or scope["method"] != "HEAD":
+        if scope["method"] != "HEAD":
             await self._app(scope, receive, send)
             return
 
@@ -62,9 +62,6 @@ class RequestLog:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, its id on every line logged meanwhile and on the answer."""
-        if scope["type"] != "http":
-            await self._app(scope, receive, send)
-            return
         asked = Headers(scope=scope).get(HEADER, "")
         number = asked if _GOOD.fullmatch(asked) else uuid.uuid4().hex
         begun, status = time.perf_counter(), 0
@@ -117,9 +114,6 @@ class HeadersAndAudit:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request on with headers on its answer."""
-        if scope["type"] != "http":
-            await self._app(scope, receive, send)
-            return
         state: dict[str, Any] = scope.setdefault("state", {})
 
         async def with_headers(message: Message) -> None:

@@ -1,8 +1,14 @@
 """A full disk: nothing is written, readiness says so, what can be read is, and the service stops."""
 
+import io
+import itertools
 import time
+from collections import Counter, defaultdict
+from collections.abc import Iterator
 from pathlib import Path
 
+import httpx
+import numpy as np
 import pytest
 from besieged import besieged
 from postgresql_cluster import Cluster
@@ -10,6 +16,8 @@ from private_kinds import PRIVATE
 from service_helpers import is_problem, serving, until
 
 from service.db.engine import Database
+from service.db.repositories.integrity import check
+from solver import load_scene
 
 EXIT_SECONDS = 10.0
 
@@ -85,3 +93,66 @@ def test_a_full_disk_of_postgresql_is_told_by_readiness(tmp_path: Path, cluster:
 def files_of(disk: Path) -> set[Path]:
     """The files of tables and of what was spilled; PostgreSQL's own cache files come and go."""
     return {file for file in disk.rglob("*") if file.is_file() and not file.name.startswith("pg_internal")}
+
+
+def written(client: httpx.Client, job: str, number: int) -> Iterator[tuple[str, httpx.Response]]:
+    """Every kind of thing that is stored, each with its name and what was answered."""
+    mine = {**load_scene("two-dof").to_dict(), "name": f"scene-{number}"}
+    file = np.full((100, 100), 1.0 + number)
+    begun = {"kind": "iteration", "sweeps": 1, "seed": number, "size": 200}
+    yield "job", client.post("/v1/jobs", json=begun, headers={"Idempotency-Key": f"{number}"})
+    data = io.BytesIO()
+    np.save(data, file)
+    yield "upload", client.post(f"/v1/uploads?name=M{number}.npy", content=data.getvalue())
+    yield "scene", client.post("/v1/scenes", json=mine)
+    yield "project", client.post("/v1/projects", json={"name": f"project {number}"})
+    yield "words", client.patch(f"/v1/runs/{job}", json={"notes": f"{number} " + 4000 * "x"})
+    yield "link", client.post(f"/v1/runs/{job}/shares", json={"days": 1.0})
+
+
+@pytest.mark.long
+def test_whatever_a_full_disk_refuses_is_refused_whole(small_disk: Path, tmp_path: Path) -> None:
+    """Each write is done or answered 503 with a problem; what was refused is not there, and is done later."""
+    url, disk = f"sqlite:///{small_disk}/jobs.db", small_disk
+    answers: dict[str, Counter[int]] = defaultdict(Counter)
+    stored: dict[str, list[str]] = defaultdict(list)
+    numbers = itertools.count()
+    lists = {"job": "/v1/jobs", "upload": "/v1/uploads", "project": "/v1/projects"}
+    with besieged(tmp_path, "ann", url=url, least_free_bytes=0) as service, service.client("ann") as client:
+        first = {"kind": "iteration", "fresh": True}
+        job = (
+            client.post("/v1/jobs", json=first, headers={"Prefer": "wait=30"}).raise_for_status().json()["id"]
+        )
+        stored["job"].append(job)
+        filler = fill(disk)
+
+        def write() -> int:
+            """Write each; how many were done."""
+            done, number = 0, next(numbers)
+            for name, answer in written(client, job, number):
+                answers[name][answer.status_code] += 1
+                if answer.is_success:
+                    done += 1
+                    stored[name].append(answer.json().get("id", ""))
+                else:
+                    assert is_problem(answer, 503)["detail"], answer.text
+                    assert int(answer.headers["Retry-After"]) > 0
+            return done
+
+        for _ in range(15):
+            write()
+        assert client.get(f"/v1/jobs/{job}").status_code == 200
+        told = {name: dict(found) for name, found in answers.items()}
+        filler.unlink()
+        until(lambda: write() == 6, seconds=30.0)
+        until(lambda: client.get("/health/ready").status_code == 200)
+        until(lambda: all(one["finished"] for one in client.get("/v1/jobs?limit=100").json()["items"]))
+        for name, path in lists.items():
+            there = {one["id"] for one in client.get(f"{path}?limit=100").json()["items"]}
+            assert there == set(stored[name]), name
+        jobs = client.get("/v1/jobs?limit=100").json()["items"]
+        assert {one["status"] for one in jobs} == {"successful"}
+        assert service.terminate() < EXIT_SECONDS
+    print(told)  # noqa: T201
+    assert all(found[503] for name, found in told.items() if name in ("job", "upload")), "it was not full"
+    assert check(url).trouble == ()

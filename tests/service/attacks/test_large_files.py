@@ -15,6 +15,9 @@ import httpx
 import numpy as np
 import pytest
 from besieged import Besieged, besieged, running
+from service_helpers import until
+
+from service.db.upload_files import WORK
 
 ADDED_MB = 150.0
 MB = 10**6
@@ -159,6 +162,9 @@ def test_parts_or_the_file_are_there_whenever_the_service_is_killed(
         with besieged(tmp_path, url=place, **limits) as service, service.client() as client:
             if kill:
                 outcomes.append(_left(client, ids, digest, rng))
+                left = list(service.folder.glob(f"**/{WORK}*"))
+                until(lambda left=left: not any(one.exists() for one in left))
+                print(f"kill {kill}: {outcomes[-1]}", flush=True)  # noqa: T201
             if kill == kills:
                 break
             ids = in_parts(client, data, size)
