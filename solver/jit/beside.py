@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from solver.jit.folder import folder
+from solver.jit.shipped import take
 
 try:
     import fcntl
@@ -60,8 +61,8 @@ def _mark(stage: Stage) -> Path:
 
 
 def on_disk(stage: Stage = Stage.FIRST) -> bool:
-    """Return whether the kernels of a stage are compiled, for this processor."""
-    return _mark(stage).exists()
+    """Return whether the kernels of a stage are compiled: for this processor, or as they came."""
+    return _mark(stage).exists() or take()
 
 
 def compiled(stage: Stage) -> None:
@@ -165,10 +166,14 @@ def ready() -> None:
         wait()
 
 
+def missing() -> bool:
+    """Return whether kernels are to be compiled, and are not on disk."""
+    return not os.environ.get(SETTING) and find_spec("numba") is not None and not on_disk()
+
+
 def is_open() -> bool:
-    """Return whether the way of this process is not settled yet, and compiled kernels are not on disk."""
-    settled = os.environ.get(SETTING) or _interprets or _is_loaded()
-    return not settled and find_spec("numba") is not None and not on_disk()
+    """Return whether they are missing, and the way of this process is not settled yet."""
+    return not (_interprets or _is_loaded()) and missing()
 
 
 def prepare(cost_of_it: Callable[[], float]) -> None:
@@ -176,14 +181,13 @@ def prepare(cost_of_it: Callable[[], float]) -> None:
 
     To be called before the first kernel is imported; nothing happens where the way is settled.
     """
-    global _interprets
     if not is_open():
         return
     if cost_of_it() > SMALL:
         ready()
         return
     begin()
-    _interprets = True
+    interpret()
     sys.stderr.write(
         f"stickslip: computed without waiting for the compiler, which runs beside ({told()}) and serves what "
         "is asked next\n"
@@ -194,6 +198,13 @@ def _is_loaded() -> bool:
     return hasattr(sys.modules.get("solver.jit.way"), "WAY")
 
 
+def interpret() -> bool:
+    """Have this process interpret its kernels if its way is open; return whether it does."""
+    global _interprets
+    _interprets = _interprets or is_open()
+    return _interprets
+
+
 def interprets() -> bool:
-    """Return whether `prepare` chose to."""
+    """Return whether this process chose to interpret its kernels."""
     return _interprets
