@@ -22,6 +22,7 @@ from service.errors import InputError
 from service.jobs.study import Answer, Study, Watch, Writable
 from service.rendering.text import show
 from solver.errors import SettingError
+from solver.jit.beside import cost, prepare
 from solver.results.views import on_demand
 from solver.results.watch import stopped_by_interrupt
 
@@ -151,8 +152,12 @@ class Keys:
 
 
 @contextmanager
-def watched(study: type[Study]) -> Iterator[Watch]:
-    """Who watches a study that computes here: a bar, and Ctrl-C, which ends it with what it has so far."""
+def watched(study: type[Study], scene: Scene, asked: Mapping[str, Any]) -> Iterator[Watch]:
+    """Who watches a study that computes here: a bar, and Ctrl-C, which ends it with what it has so far.
+
+    Kernels that are not on disk are interpreted or waited for, before the study and its clocks begin.
+    """
+    prepare(lambda: cost(study.NAME, scene, asked))
     with bar(study.NAME, study.COUNTED) as on_progress, stopped_by_interrupt() as should_stop:
         yield Watch(on_progress, should_stop)
 
@@ -170,7 +175,7 @@ def command_of(study: type[Study]) -> Callable[..., None]:
         asked = keys.read(given)
         if wrong := study.model_construct(**asked).issues(scene):
             raise refused(wrong, keys.flags)
-        with keys.named(), watched(study) as watch:
+        with keys.named(), watched(study, scene, asked) as watch:
             answer = study.compute(scene, asked, watch)
         give(study, answer, outputs, scene, as_json=as_json)
 
