@@ -253,6 +253,7 @@ def test_a_design_with_a_scene_of_its_own_and_a_kind_without_a_view_are_opened(
     expect(page.locator("#others-from")).to_have_value("60")
 
 
+@pytest.mark.long
 def test_what_is_under_way_is_seen_in_a_fresh_tab(profile: Profile, site: Site) -> None:
     body = {"kind": "map", "scene": "two-dof", "parameter": "damper.N0", "from": 20, "to": 60,
             "steps": 4000, "frequencies": 120, "harmonics": 200, "ridge": False, "fresh": True}  # fmt: skip
