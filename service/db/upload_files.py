@@ -74,7 +74,10 @@ class UploadFiles:
                 try_lock(held)
                 held.write(f"{os.getpid()}\n")  # what is not written yet may not be locked yet
                 held.flush()
-                yield Path(folder)
+                try:
+                    yield Path(folder)
+                finally:
+                    _empty(Path(folder))
         except OSError as error:
             if error.errno not in (errno.ENOSPC, errno.EDQUOT):
                 raise
@@ -155,6 +158,17 @@ class UploadFiles:
             for path in old:
                 if path.name not in named and not path.is_dir():
                     path.unlink(missing_ok=True)
+
+
+def _empty(folder: Path) -> None:
+    """Delete what a folder of `work` has; what holds it goes last, as it tells whose it is."""
+    for path in folder.iterdir():
+        if path.name == _HELD:
+            continue
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink()
 
 
 def _nobodys(folder: Path, before: float) -> bool:

@@ -170,6 +170,7 @@ def test_the_table_of_laws_has_it() -> None:
     assert line == f"| `sliders` | {SlidersContact.FORCE} | `k`, `limit` |"
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("registered")
 def test_the_command_solves_it(tmp_path: Path, command: Callable[..., Any]) -> None:
     (tmp_path / "joined.json").write_text(json.dumps(SCENE))

@@ -58,6 +58,7 @@ async ({ esm, state }) => {
 """
 
 
+@pytest.mark.long
 def test_it_works_in_a_browser(tmp_path: Path) -> None:
     """The module by itself, in a host with a model as front ends of anywidget have it."""
     api = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")

@@ -147,6 +147,7 @@ def test_the_disk_is_for_everybody_too(browser: Browser, site: Site, scheme: str
         assert page.evaluate(OVERLAPS) == []
 
 
+@pytest.mark.long
 def test_by_keyboard_alone(profile: Profile, site: Site, studied: str) -> None:
     context, _ = profile
     page = visit(context, site, studied)

@@ -72,6 +72,7 @@ def test_the_first_screen_holds_the_answer(profile: Profile, site: Site, found: 
         assert box["y"] + box["height"] <= 900, f"{part} stands below the fold"
 
 
+@pytest.mark.long
 def test_what_changed_is_said_on_every_card_and_renewed_there(
     profile: Profile, site: Site, found: str
 ) -> None:

@@ -34,6 +34,7 @@ def box(page: Page, part: str) -> tuple[float, float, float, float]:
     return found["x"], found["y"], found["x"] + found["width"], found["y"] + found["height"]
 
 
+@pytest.mark.long
 def test_curve_and_sliders_stand_side_by_side_under_the_answer(profile: Profile, site: Site) -> None:
     page = visit(profile[0], site, "?scene=two-dof")
     page.click("#study")
@@ -63,6 +64,7 @@ def test_curve_and_sliders_stand_side_by_side_under_the_answer(profile: Profile,
         assert page.evaluate(SIDEWAYS) <= 0
 
 
+@pytest.mark.long
 def test_the_rail_is_a_drawer_where_there_is_no_room(profile: Profile, site: Site) -> None:
     page = visit(profile[0], site, "?scene=two-dof")
     for width, height, scene in ((1024, 768, "bladed-disk"), (390, 844, "two-dof")):

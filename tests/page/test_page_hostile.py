@@ -63,6 +63,7 @@ def test_stored_markup_is_text_on_the_page(browser: Browser, poisoned: Address) 
         unhurt(page)
 
 
+@pytest.mark.long
 @pytest.mark.few(4)
 @pytest.mark.parametrize(
     "text",

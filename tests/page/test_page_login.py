@@ -38,6 +38,7 @@ def locked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         yield url
 
 
+@pytest.mark.long
 def test_a_person_logs_in(browser: Browser, locked: str) -> None:
     with browser.new_context() as context:
         page = context.new_page()

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 Profile = tuple["BrowserContext", Watch]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sector", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_matrices_become_a_scene_and_its_response(profile: Profile, site: Site, sector: bool) -> None:
     context, watch = profile

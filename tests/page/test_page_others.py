@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
 
+@pytest.mark.long
 def test_a_kind_without_a_view_has_a_form_and_a_result(browser: Browser, site: Site) -> None:
     with opened(browser, site) as (context, watch):
         page = context.new_page()

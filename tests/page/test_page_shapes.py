@@ -102,6 +102,7 @@ def test_points_are_drawn_where_the_solver_moves_them(
         assert drawn == pytest.approx(turned(j, sectors, own), abs=2e-2 * largest)
 
 
+@pytest.mark.long
 def test_a_shape_is_opened_coloured_played_and_saved(
     profile: tuple[BrowserContext, Watch], site: Site
 ) -> None:

@@ -81,16 +81,13 @@ def test_a_project_gathers_runs_that_are_named_found_and_thrown_away(profile: Pr
     project = page.input_value("#project")
     run = run_of(site, set={"damper.N0": 77.5}, project=project)
     # A form that opens before the projects are known keeps the run's own.
-    held: list[Any] = []
-    page.route("**/v1/projects*", held.append)
+    profile[1].allowed = ("net::ERR_FAILED",)
+    page.route("**/v1/projects*", lambda route: route.abort())
     page.reload()
     mine = row(page, run)
     expect(mine).to_contain_text("damper.N0 77.5 N")
     form = more(page, run)
     page.unroute("**/v1/projects*")
-    for route in held:
-        route.continue_()
-    expect(page.locator("#project option:checked")).to_have_text("Shroud of stage 3 (1)")
     form.get_by_label("Name").fill("too soft")
     form.get_by_label("Notes").fill("it slips all the time")
     form.get_by_label("Tags, with commas").fill("rejected, may")
@@ -256,6 +253,7 @@ def test_a_design_with_a_scene_of_its_own_and_a_kind_without_a_view_are_opened(
     expect(page.locator("#others-from")).to_have_value("60")
 
 
+@pytest.mark.long
 def test_what_is_under_way_is_seen_in_a_fresh_tab(profile: Profile, site: Site) -> None:
     body = {"kind": "map", "scene": "two-dof", "parameter": "damper.N0", "from": 20, "to": 60,
             "steps": 4000, "frequencies": 120, "harmonics": 200, "ridge": False, "fresh": True}  # fmt: skip

@@ -140,6 +140,7 @@ def test_an_attempt_that_waits_can_be_stopped(executor: LocalExecutor, heard: He
     assert isinstance(heard.of("third"), Stopped if killed else Finished)
 
 
+@pytest.mark.long
 def test_a_process_that_dies_costs_the_attempt_it_computed_alone(
     executor: LocalExecutor, heard: Heard, tmp_path: Path
 ) -> None:

@@ -323,6 +323,7 @@ def test_the_jobs_of_a_killed_service_are_done_by_another(tmp_path: Path, start:
     assert process.wait(PATIENCE) == 0
 
 
+@pytest.mark.long
 def test_names_that_cannot_be_stored_are_refused(start: Start) -> None:
     _, client = start()
     until(lambda: answers(client))

@@ -256,6 +256,7 @@ def test_two_are_computed_at_a_time() -> None:
     both.close()
 
 
+@pytest.mark.long
 def test_closing_tells_those_who_wait() -> None:
     closing = Previews(5.0, KINDS, workers=1)
     together(closing, ("spend", 0.0, ""))

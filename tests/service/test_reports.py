@@ -119,6 +119,7 @@ def test_only_what_has_a_report_is_reported(shipped: httpx.Client) -> None:
     assert "'solve', which has no report: only design, pareto" in problem["detail"]
 
 
+@pytest.mark.long
 def test_measured_data_become_tables_of_a_job(shipped: httpx.Client) -> None:
     files = [{"name": "rig.csv", "text": ROWS}, {"name": "torn.csv", "text": ROWS.replace("2120", "")}]
     body = {"scene": "two-dof", "files": [*files, {"name": "far.csv", "text": ROWS.replace("[Hz]", "[kHz]")}]}

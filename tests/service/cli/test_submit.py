@@ -53,6 +53,7 @@ def test_a_design_from_submission_to_picture(run: Run, tmp_path: Path) -> None:
     assert answer["sweeps"][0]["id"] in out
 
 
+@pytest.mark.long
 def test_a_problem_file_goes_with_the_job_and_the_design_is_listed(run: Run, tmp_path: Path) -> None:
     scene = solver.load_scene("two-dof").with_values({"damper.N0": 70.0}).to_dict()
     (tmp_path / "mine.json").write_text(json.dumps({**scene, "name": "mine"}))

@@ -67,6 +67,7 @@ def test_only_what_tells_its_progress_can_have_one() -> None:
         shows_progress("solve")(solver.solve)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not hasattr(pty, "openpty"), reason="there are no pseudo-terminals here")
 def test_a_terminal_shows_it_and_the_command_has_its_own() -> None:
     """In a process whose standard error is a terminal; without a tenth of a second of patience."""
