@@ -64,7 +64,6 @@ def test_stored_markup_is_text_on_the_page(browser: Browser, poisoned: Address) 
 
 
 @pytest.mark.long
-@pytest.mark.few(4)
 @pytest.mark.parametrize(
     "text",
     [f"'{BAD}' = 1", f"name = '{BAD}'", f"[[contacts]]\nname = '{BAD}'", f"[structure]\nkind = '{BAD}'"],

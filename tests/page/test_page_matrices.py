@@ -28,7 +28,7 @@ Profile = tuple["BrowserContext", Watch]
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("sector", [False, pytest.param(True, marks=pytest.mark.long)])
+@pytest.mark.parametrize("sector", [False, True])
 def test_matrices_become_a_scene_and_its_response(profile: Profile, site: Site, sector: bool) -> None:
     context, watch = profile
     watch.allowed = ("status of 422",)

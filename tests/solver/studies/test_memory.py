@@ -76,7 +76,6 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any], str, int]] = {
 
 
 @pytest.mark.long
-@pytest.mark.few(keep=("masses with a damper",))
 @pytest.mark.parametrize("name", CASES)
 def test_a_solve_takes_about_the_memory_that_is_said(name: str) -> None:
     scene, small, do, harmonics = CASES[name]
