@@ -33,7 +33,10 @@ COMPILER = "service.warm_up"  # what is run to compile: a module of a layer abov
 SMALL = 2000.0  # unknowns × solves, see `cost`: less than a minute interpreted, as long as compiling takes
 SOLVES = {"solve": 1.0, "sweep": 8.0, "design": 35.0}
 """How many times as long as one response each study takes; what is not here is never small."""
-_CHEAP = {"frequency_hz", "harmonics", "variables", "start", "stop", "on_progress", "should_stop", "on_best"}
+_CHEAP = {
+    "frequency_hz", "harmonics", "variables", "method", "start", "stop", "on_progress", "should_stop",
+    "on_best",
+}  # fmt: skip
 """Keys with which it takes no longer; with all others it is not small."""
 _PAUSE, _LINE, _PATIENCE = 0.25, 10.0, 30.0  # s: between two looks, two lines, and for a compiler to begin
 _TRIES = 3
@@ -153,9 +156,10 @@ def cost(kind: str, scene: Any, asked: Mapping[str, Any]) -> float:
 
     A contact of several motions has their directions to find: it takes about the third power of their number.
     """
-    if kind not in SOLVES or not asked.keys() <= _CHEAP or not isinstance(asked.get("harmonics", 11), int):
+    harmonics, usual = asked.get("harmonics", 11), asked.get("method", "auto") == "auto"
+    if kind not in SOLVES or not asked.keys() <= _CHEAP or not isinstance(harmonics, int) or not usual:
         return math.inf
-    unknowns = (2 * asked.get("harmonics", 11) + 1) * sum(len(one.stiffnesses) ** 3 for one in scene.contacts)
+    unknowns = (2 * harmonics + 1) * sum(len(one.stiffnesses) ** 3 for one in scene.contacts)
     return unknowns * SOLVES[kind] * len(asked.get("variables") or "1")
 
 

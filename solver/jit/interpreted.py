@@ -9,6 +9,8 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any, TypeVar
 
+from solver.jit.forms import Form
+
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
@@ -49,8 +51,9 @@ class Kernels:
         return self._made[number](*arguments)
 
 
-def numbered(_arguments: object, _result: object, known: tuple[str, ...] = ()) -> Any:
+def numbered(arguments: tuple[Form, ...], result: Form, known: tuple[str, ...] = ()) -> Any:
     """Make the function it decorates the contract of kernels called by number, see `solver.jit.tables`."""
+    del arguments, result  # Python asks for no types
     return lambda _function: Kernels(known)
 
 
