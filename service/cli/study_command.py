@@ -152,12 +152,8 @@ class Keys:
 
 
 @contextmanager
-def watched(study: type[Study], scene: Scene, asked: Mapping[str, Any]) -> Iterator[Watch]:
-    """Who watches a study that computes here: a bar, and Ctrl-C, which ends it with what it has so far.
-
-    Kernels that are not on disk are interpreted or waited for, before the study and its clocks begin.
-    """
-    prepare(lambda: cost(study.NAME, scene, asked))
+def watched(study: type[Study]) -> Iterator[Watch]:
+    """Who watches a study that computes here: a bar, and Ctrl-C, which ends it with what it has so far."""
     with bar(study.NAME, study.COUNTED) as on_progress, stopped_by_interrupt() as should_stop:
         yield Watch(on_progress, should_stop)
 
@@ -173,9 +169,10 @@ def command_of(study: type[Study]) -> Callable[..., None]:
         outputs = Outputs.asked(plot, out)
         scene = inputs.scene(name, values)
         asked = keys.read(given)
+        prepare(lambda: cost(study.NAME, scene, asked))
         if wrong := study.model_construct(**asked).issues(scene):
             raise refused(wrong, keys.flags)
-        with keys.named(), watched(study, scene, asked) as watch:
+        with keys.named(), watched(study) as watch:
             answer = study.compute(scene, asked, watch)
         give(study, answer, outputs, scene, as_json=as_json)
 

@@ -34,7 +34,8 @@ SMALL = 2000.0  # unknowns × solves, see `cost`: less than a minute interpreted
 SOLVES = {"solve": 1.0, "sweep": 8.0, "design": 35.0}
 """How many times as long as one response each study takes; what is not here is never small."""
 _CHEAP = {
-    "frequency_hz", "harmonics", "variables", "method", "start", "stop", "on_progress", "should_stop", "on_best",
+    "frequency_hz", "harmonics", "variables", "method", "start", "stop", "on_progress", "should_stop",
+    "on_best",
 }  # fmt: skip
 """Keys with which it takes no longer; with all others it is not small."""
 _PAUSE, _LINE, _PATIENCE = 0.25, 10.0, 30.0  # s: between two looks, two lines, and for a compiler to begin

@@ -37,7 +37,7 @@ def command_of_problem(study: type[ProblemRequest]) -> Callable[..., None]:
         outputs = Outputs.asked(plot, out)
         page = inputs.output_path("--report", report, SUFFIXES)
         scene, given = problem_inputs.posed(told, study)
-        with told.named(), watched(study, scene, given) as watch:
+        with told.named(), watched(study) as watch:
             answer = study.compute(scene, given, watch)
         if page is not None:
             from service.rendering.report.sections import Designed

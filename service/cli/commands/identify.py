@@ -89,7 +89,7 @@ def _computed(keys: Keys, scene: Scene, asked: dict[str, Any], columns: list[str
     study = keys.study
     if wrong := study.model_construct(**asked).issues(scene):
         raise refused(wrong, keys.flags)
-    with keys.named(), watched(study, scene, asked) as watch:
+    with keys.named(), watched(study) as watch:
         if columns:
             from optim.identification.reading import with_columns
 

@@ -112,3 +112,31 @@ def test_where_the_compiler_fails_nobody_waits_for_ever(folder: Path) -> None:
 )
 def test_what_is_small(kind: str, scene: str, asked: dict[str, object], small: bool) -> None:
     assert (beside.cost(kind, solver.load_scene(scene), asked) <= beside.SMALL) is small
+
+
+@pytest.mark.parametrize("arguments", ["solve two-dof --frequency 1", "design two-dof"])
+def test_a_command_prepares_before_it_loads_a_kernel(folder: Path, arguments: str) -> None:
+    code = (
+        "import sys; from solver.jit import beside; beside.COMPILER = 'compiler';"
+        "from service.cli.app import run; sys.exit(run(sys.argv[1:]))"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", code, *arguments.split(), "--harmonics", "1", "--json"], check=False,
+        capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stderr.count("\n") == 1
+    assert "computed without waiting for the compiler" in ran.stderr
+    assert not list(folder.glob("*.nbi")), "nothing was compiled on the way"
+
+
+def test_a_script_prepares_before_it_loads_a_kernel(folder: Path) -> None:
+    code = (
+        "import solver; from solver.jit import beside; beside.COMPILER = 'compiler'\n"
+        "print(solver.solve('two-dof', frequency_hz=1.0, harmonics=1).max_abs)"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+    assert float(ran.stdout) > 0.0
+    assert "computed without waiting for the compiler" in ran.stderr
+    assert not list(folder.glob("*.nbi"))
