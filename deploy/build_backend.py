@@ -18,7 +18,7 @@ from typing import Any
 from setuptools import build_meta
 from setuptools.build_meta import *  # noqa: F403 - whatever a backend may have
 
-_HERE = Path(__file__).parent
+_HERE = Path(__file__).parents[1]
 _ASKED = os.environ.get("STICKSLIP_WHEEL_KERNELS", "") not in ("", "0")
 
 
