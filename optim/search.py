@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Unpack
@@ -32,6 +31,7 @@ from optim.problem.typed import Limit, with_limits
 from optim.results.design import DesignResult, DesignStatus
 from optim.results.parts import SAME_PLACE, LocalOptimum, OnBest
 from solver.continuation.branch import BranchStatus
+from solver.jit.clock import clock
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 
@@ -192,7 +192,7 @@ def _solved(
         from optim.methods.performance_curve import curve_optimum
 
         return curve_optimum(problem, on_progress=on_progress, should_stop=should_stop)
-    begun = time.perf_counter()
+    begun = clock()
     tracked = None
     trackable = problem.method in (Method.AUTO, Method.TRACKED) and problem.why_not_tracked is None
     if trackable:
@@ -205,7 +205,7 @@ def _solved(
     search = DesignSearch(problem, on_progress, should_stop, on_best=on_best, before=earlier)
     eased = Eased.of(search, tracked)
     if eased.proven is not None:
-        return replace(eased.proven, seconds=time.perf_counter() - begun)
+        return replace(eased.proven, seconds=clock() - begun)
     found: list[Local] = []
     if before is not None and before.problem.cases is not problem.cases:
         before = None  # by another measure nothing is known but responses
@@ -294,5 +294,5 @@ def _result(search: DesignSearch, whole: WholeRange, status: DesignStatus, begun
         problem=search.problem, method=method, status=status, evaluation=evaluation,
         conditions=None if best is None else best.conditions, basins=basins_of(search, whole.found),
         looked_at=whole.looked_at, history=tuple(search.history), evaluations=responses,
-        work=float(responses), seconds=time.perf_counter() - begun,
+        work=float(responses), seconds=clock() - begun,
     )  # fmt: skip

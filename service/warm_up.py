@@ -2,17 +2,19 @@
 
 Part of ``make setup`` and ``make test``. All cores compile at once; the machine code is cached on disk and
 serves every process from then on. With ``--first`` only what a response and a design of a scene like the
-paper's call is compiled, in half the time: ``make demo`` does the rest after its first optimum.
+paper's call is compiled, in half the time: ``make demo`` does the rest after its first optimum. Who
+finds nothing compiled has it done by ``--beside``: both, one after the other, if nobody else is at it.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 
 import solver
 from service.jobs.kinds import warm_up
 from solver.contacts.laws.registry import laws
-from solver.jit.parallel import compile_together
+from solver.jit import beside
 
 
 def referee() -> None:
@@ -34,10 +36,24 @@ def main() -> None:
     parser.add_argument(
         "--first", action="store_true", help="only what a response and a design with Coulomb friction call"
     )
-    if parser.parse_args().first:
-        compile_together([warm_up], listed=False)
-    else:
-        compile_together([warm_up, referee, functions_of_laws])
+    parser.add_argument("--beside", action="store_true", help="end if another process compiles already")
+    asked = parser.parse_args()
+    # Who compiles waits for nobody's kernels.
+    os.environ.setdefault(beside.SETTING, "compiled")
+    from solver.jit.parallel import compile_together
+
+    with beside.compiling(wait=not asked.beside) as mine:
+        if not mine:
+            return
+        if asked.beside and hasattr(os, "nice"):
+            os.nice(5)
+        if asked.first or asked.beside:
+            compile_together([warm_up], listed=False)
+            beside.compiled(beside.Stage.FIRST)
+        if not asked.first:
+            compile_together([warm_up, referee, functions_of_laws])
+            for stage in beside.Stage:
+                beside.compiled(stage)
 
 
 if __name__ == "__main__":

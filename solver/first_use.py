@@ -44,6 +44,8 @@ def on_first_use(
         if name not in homes:
             known = sys.modules[package]  # what Python reads to ask "Did you mean …?"
             raise AttributeError(f"module {package!r} has no attribute {name!r}", name=name, obj=known)
+        if name in _OF_KERNELS and (first := _first_call(package, name)):
+            return first
         value = getattr(import_module(homes[name]), name)
         if homes[name].startswith(f"{package}."):  # not what another package has made public already
             value = _of_a_scene(value, package)
@@ -51,6 +53,27 @@ def on_first_use(
         return value
 
     return load, lambda: sorted({*vars(sys.modules[package]), *homes}), sorted(homes)
+
+
+_OF_KERNELS = ("solve", "sweep", "design")  # what may begin before kernels are compiled
+
+
+def _first_call(package: str, name: str) -> Callable[..., object] | None:
+    """What stands for a function while nothing is compiled: it prepares kernels for what it is asked."""
+    if os.environ.get("STICKSLIP_KERNELS") or "solver.jit.way" in sys.modules:
+        return None
+    beside = import_module("solver.jit.beside")
+    if not beside.is_open():
+        return None
+
+    def asked(scene: object, *args: object, **kwargs: object) -> object:
+        scene = _scene_of(scene)
+        beside.prepare(lambda: beside.cost(name, scene, kwargs))
+        value: Callable[..., object] = getattr(sys.modules[package], name)
+        return value(scene, *args, **kwargs)
+
+    asked.__name__, asked.__module__ = name, package
+    return asked
 
 
 def _of_a_scene(value: object, package: str) -> object:

@@ -17,6 +17,8 @@ for _library in ("OMP", "OPENBLAS", "MKL"):
 # As every command sets it. Workers are forked off one process as long as no setting is changed: each that
 # starts after a test of the command, in this process, would begin from nothing.
 os.environ.setdefault("STICKSLIP_PROGRESS", "0")
+# Tests wait for no compiler beside them: what they call is on disk, or compiled where it is called.
+os.environ.setdefault("STICKSLIP_KERNELS", "compiled")
 
 # Certificates of authorities are looked up in an empty folder: to read a list of all takes each client 30 ms,
 # and every service that is asked is on loopback, or shows a certificate of the test's own.

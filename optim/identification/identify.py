@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -25,6 +24,7 @@ from optim.problem.variables import Real
 from solver.balance.balance import check_harmonics
 from solver.balance.parameter import resolve
 from solver.errors import SceneError, SettingError
+from solver.jit.clock import clock
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 
@@ -81,7 +81,7 @@ def identify(
     DesignError, SettingError
         Bad unknowns, priors, candidates or settings.
     """
-    begun = time.perf_counter()
+    begun = clock()
     known = read_unknowns(scene, unknowns, scaling, priors)
     check_fit(noise, starts, seed, harmonics)
     measured = read_data(scene, data, known.paths)
@@ -93,7 +93,7 @@ def identify(
     else:
         _check_plausible(runs, found.best)
         result = _judged(runs, found, found.best, told, conditions)
-    return replace(result, seconds=time.perf_counter() - begun)
+    return replace(result, seconds=clock() - begun)
 
 
 def check_fit(noise: float | None, starts: int, seed: int, harmonics: int) -> None:

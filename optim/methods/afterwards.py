@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -20,6 +19,7 @@ from optim.results.design import DesignResult, DesignStatus
 from optim.results.doubts import DOUBTFUL, open_peaks
 from optim.results.json import known_parts
 from optim.results.parts import Checked, LocalOptimum
+from solver.jit.clock import clock
 from solver.results.watch import ShouldStop
 
 HELD = 1e-7  # multiplier of a bound, relative objective per scaled variable, from which it holds the design
@@ -61,7 +61,7 @@ def looked_after(
     tick : called after every design looked at.
     more : evaluations with more harmonics that are known already.
     """
-    begun = time.perf_counter()
+    begun = clock()
     found = result
     stopped = result.status in (DesignStatus.STOPPED, DesignStatus.NO_RESPONSE)
     if result.evaluation is not None and result.evaluation.good and not stopped:
@@ -69,7 +69,7 @@ def looked_after(
             found = _checked(_level(found, should_stop, tick).with_errors(), should_stop, tick, more)
         except SearchStoppedError:
             found = replace(found, status=DesignStatus.STOPPED)
-    return replace(_proven(found), seconds=result.seconds + time.perf_counter() - begun)
+    return replace(_proven(found), seconds=result.seconds + clock() - begun)
 
 
 def _proven(result: DesignResult) -> DesignResult:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 
 from optim.criteria.evaluation import Judge, effects_of, evaluate, ranges_of
@@ -14,6 +13,7 @@ from optim.problem.problem import Method, Problem
 from optim.results.design import DesignResult, DesignStatus
 from optim.results.parts import PEAKS_OPEN, VERIFIED, BestSoFar, LocalOptimum, OnBest
 from solver.continuation.branch import Branch
+from solver.jit.clock import clock
 from solver.results.watch import OnProgress, ShouldStop
 from solver.studies.peaks.minimise_peak import least_peak
 from solver.studies.peaks.results import LeastPeak, TrackStatus
@@ -49,7 +49,7 @@ def tracked_optimum(
     should_stop : asked between sweeps.
     on_best : told of every response that is the lowest so far.
     """
-    begun = time.perf_counter()
+    begun = clock()
     case, variable = problem.cases[0], problem.variables[0]
     first = None if problem.start is None else problem.start[variable.name]
     effects = effects_of(problem, case.scene)
@@ -71,7 +71,7 @@ def tracked_optimum(
     extra = float(evaluation is not None and problem.limit is not None)
     return of_one(
         problem, Method.TRACKED, _STATUS[found.status], evaluation, basins=basins,
-        evaluations=found.sweeps + int(extra), work=found.work + extra, seconds=time.perf_counter() - begun,
+        evaluations=found.sweeps + int(extra), work=found.work + extra, seconds=clock() - begun,
     )  # fmt: skip
 
 

@@ -10,7 +10,6 @@ estimates it without.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -26,6 +25,7 @@ from optim.problem.problem import Method, Problem
 from optim.problem.variables import BoundedVariable, Real, by_variables, parameter_values, unscaled
 from optim.results.design import DesignResult, DesignStatus
 from optim.results.parts import CurveCheck
+from solver.jit.clock import clock
 from solver.modes.peaks.peak_correction import corrected_peak
 from solver.modes.peaks.peak_gradient import CurvePeak, peak_at_excitation
 from solver.modes.peaks.performance import PerformanceCurve
@@ -89,7 +89,7 @@ def curve_optimum(problem: Problem, *, on_progress: OnProgress, should_stop: Sho
     on_progress : called with (share done, curves so far).
     should_stop : asked between curves.
     """
-    begun = time.perf_counter()
+    begun = clock()
 
     def ended(
         status: DesignStatus, evaluation: DesignEvaluation | None = None, check: CurveCheck | None = None
@@ -97,7 +97,7 @@ def curve_optimum(problem: Problem, *, on_progress: OnProgress, should_stop: Sho
         computed = int(evaluation is not None)
         return of_one(
             problem, Method.PERFORMANCE_CURVE, status, evaluation, basins=(), curve=check,
-            evaluations=computed, work=float(computed), seconds=time.perf_counter() - begun,
+            evaluations=computed, work=float(computed), seconds=clock() - begun,
         )  # fmt: skip
 
     curves = _Curves(problem=problem, should_stop=should_stop, on_progress=on_progress)
@@ -118,15 +118,15 @@ def curve_optimum(problem: Problem, *, on_progress: OnProgress, should_stop: Sho
     else:
         own, ratio = curve, values[problem.variables[0].name] / _middle(problem.variables[0])
     synthesised = ratio * peak_at_excitation(own, 1.0 / ratio).peak
-    found = time.perf_counter()
+    found = clock()
     corrected = ratio * corrected_peak(own, 1.0 / ratio).peak
-    estimated = time.perf_counter()
+    estimated = clock()
     evaluation = evaluate(problem, values, should_stop=should_stop)
     exact = evaluation.peaks[0].value if evaluation.good and evaluation.peaks else math.nan
     check = CurveCheck(
         mode=own.mode.mode, shared=curve is not None, curves=curves.count, synthesised=synthesised,
         corrected=corrected, exact=exact, tolerance=problem.tolerance, curve_seconds=found - begun,
-        correction_seconds=estimated - found, response_seconds=time.perf_counter() - estimated,
+        correction_seconds=estimated - found, response_seconds=clock() - estimated,
         exact_responses=_EXACT_RESPONSES,
     )  # fmt: skip
     if on_progress is not None:

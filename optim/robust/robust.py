@@ -13,7 +13,6 @@ Lectures on Stochastic Programming, SIAM 2009, chapter 5): the same samples for 
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Unpack
@@ -41,6 +40,7 @@ from optim.robust.scenarios import Outcome, rank_of
 from optim.robust.search import RobustSearch
 from optim.robust.worst_case import MOST_BESIDES, Aspect, UnknownScenarioError
 from optim.search import solve_problem
+from solver.jit.clock import clock
 from solver.results.known import worst_of
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
@@ -161,7 +161,7 @@ def robust_design(
     TypeError
         An argument that is no key.
     """
-    begun = time.perf_counter()
+    begun = clock()
     posed = pose(scene, **with_limits(problem, limits))
     if posed.method is Method.PERFORMANCE_CURVE:
         raise DesignError("method", posed.method.value, "must be another one: a curve knows no uncertainty")
@@ -176,7 +176,7 @@ def robust_design(
     found = _run(search, drawn, should_stop)
     if on_progress is not None:
         on_progress(1.0, search.responses)
-    return replace(found, seconds=time.perf_counter() - begun)
+    return replace(found, seconds=clock() - begun)
 
 
 def _quantile(share: object) -> float:

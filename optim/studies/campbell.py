@@ -8,7 +8,6 @@ own frequency response, not natural frequencies; those are given beside them.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -24,6 +23,7 @@ from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.error_estimate import ErrorEstimator
 from solver.continuation.peaks import Peak
 from solver.errors import Place
+from solver.jit.clock import clock
 from solver.jit.fourier import Real
 from solver.linear.natural_frequencies import natural_frequencies
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
@@ -65,7 +65,7 @@ def campbell_diagram(
     DesignError, SettingError
         Bad speeds, orders, band, limit or number of harmonics.
     """
-    begun = time.perf_counter()
+    begun = clock()
     speeds, chosen = _speeds(speeds_rpm), _orders(scene, orders)
     looked_at = None if band_hz is None else _positive_pair("band_hz", band_hz, "Hz")
     cyclic = scene.structure.has_sectors
@@ -91,7 +91,7 @@ def campbell_diagram(
             break
     return CampbellDiagram(
         scene=scene, speeds_rpm=speeds, limit=limit, orders=tuple(found), n_harmonics=harmonics,
-        status=_status(found, len(chosen), stopped=stopped), seconds=time.perf_counter() - begun,
+        status=_status(found, len(chosen), stopped=stopped), seconds=clock() - begun,
     )  # fmt: skip
 
 

@@ -8,7 +8,6 @@ design so far is cut off: it cannot be the best, as every other term of the obje
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
@@ -25,6 +24,7 @@ from optim.results.design import DesignResult, DesignStatus
 from optim.results.parts import CatalogueOption, OptionStatus
 from optim.search import solve_problem
 from solver.errors import Place, at
+from solver.jit.clock import clock
 from solver.results.told import Piece
 from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.scene import Scene
@@ -67,7 +67,7 @@ def catalogue(
     SettingError, SceneError, DesignError
         A bad option, or a bad key of the problem.
     """
-    begun = time.perf_counter()
+    begun = clock()
     posed = check_options(scene, options, problem)
     bounds = {name: _least(each) for name, each in posed.items()}
     found: list[tuple[CatalogueOption, DesignResult | None]] = []
@@ -91,7 +91,7 @@ def catalogue(
     whole = replace(
         _with_option(first[1], options[first[0].name]), options=ranked,
         evaluations=sum(one.evaluations for one in effort), work=sum(one.work for one in effort),
-        seconds=time.perf_counter() - begun,
+        seconds=clock() - begun,
     )  # fmt: skip
     if any(option.status is OptionStatus.STOPPED for option in ranked):
         whole = replace(whole, status=DesignStatus.STOPPED)
@@ -162,7 +162,7 @@ def _searched(problem: Problem, on_progress: OnProgress, should_stop: ShouldStop
     """Return the best design of an option; of one without variables its only one."""
     if problem.variables:
         return solve_problem(problem, on_progress=on_progress, should_stop=should_stop)
-    begun = time.perf_counter()
+    begun = clock()
     only = evaluate(problem, {}, gradients=False, should_stop=should_stop)
     stopped = not only.good and should_stop is not None and should_stop()
     kept = only.good and only.violation(natural_scales(problem)) <= KEPT
@@ -172,7 +172,7 @@ def _searched(problem: Problem, on_progress: OnProgress, should_stop: ShouldStop
     return DesignResult(
         problem=problem, method=Method.AUTO, status=status, evaluation=only if only.good else None,
         conditions=None, basins=(), history=(only,), evaluations=only.computed, work=float(only.computed),
-        seconds=time.perf_counter() - begun,
+        seconds=clock() - begun,
     )  # fmt: skip
 
 

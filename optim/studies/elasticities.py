@@ -8,7 +8,6 @@ homogeneous system of degree one the elasticities of a peak by f0 and by all nor
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -32,6 +31,7 @@ from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.extrema import HALF_POWER
 from solver.continuation.peaks import Peak
+from solver.jit.clock import clock
 from solver.scene.parameter_paths import PHASE
 from solver.scene.scene import Scene
 
@@ -54,7 +54,7 @@ def sensitivities(
     SettingError
         A bad path, value, limit or number of harmonics.
     """
-    begun = time.perf_counter()
+    begun = clock()
     here = scene if values is None else scene.with_values(values)
     known = here.parameter_paths()
     effects = Effects(even_harmonics=even_harmonics_reason(here, known) is not None)
@@ -64,7 +64,7 @@ def sensitivities(
         status = SensitivityStatus.UNDAMPED if undamped else SensitivityStatus.NO_RESPONSE
         return SensitivityResult(
             scene=here, status=status, branch=branch, peaks=(), rows=(),
-            band_by_limit=math.nan, left_out=(), seconds=time.perf_counter() - begun,
+            band_by_limit=math.nan, left_out=(), seconds=clock() - begun,
         )  # fmt: skip
     paths, left_out = _differentiable(here, branch, known)
     peaks = tuple(peak for peak in branch.peaks if peak.value >= COMPETES * branch.peak.value)
@@ -75,7 +75,7 @@ def sensitivities(
         peaks=peaks, rows=rows, band_by_limit=by_limit, left_out=left_out, seconds=0.0,
     )  # fmt: skip
     in_order = tuple(sorted(rows, key=partial(_rank, found)))
-    return replace(found, rows=in_order, seconds=time.perf_counter() - begun)
+    return replace(found, rows=in_order, seconds=clock() - begun)
 
 
 def _differentiable(

@@ -9,7 +9,6 @@ the best of all designs seen so far and of one predicted between the neighbours 
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -33,6 +32,7 @@ from optim.problem.variables import BoundedVariable, scaled, unscaled
 from optim.results.design import DesignResult, DesignStatus
 from optim.search import judge, local_search_of, solve_problem
 from optim.studies.pareto_result import ParetoPoint, ParetoResult, ParetoStatus, front_of
+from solver.jit.clock import clock
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 
@@ -85,7 +85,7 @@ def pareto_front(
     TypeError
         An argument that is no key.
     """
-    begun = time.perf_counter()
+    begun = clock()
     posed = replace(pose(scene, **with_limits(problem, limits)), keeps_measure=True)
     if isinstance(points, bool) or not isinstance(points, int) or points < FEWEST_POINTS:
         raise DesignError("points", points, f"must be a whole number >= {FEWEST_POINTS}")
@@ -99,7 +99,7 @@ def pareto_front(
     return ParetoResult(
         problem=front.problem, status=_status_of_known(front, status), ends=tuple(front.ends), points=kept,
         dominated=dominated,
-        missed=tuple(front.missed), evaluations=front.evaluations, seconds=time.perf_counter() - begun,
+        missed=tuple(front.missed), evaluations=front.evaluations, seconds=clock() - begun,
     )  # fmt: skip
 
 

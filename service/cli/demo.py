@@ -16,7 +16,7 @@ import numpy as np
 import solver
 from optim.views.tables.design import design
 from service.cli.failures import ShortfallError
-from service.cli.progress import Reporter, bars, patience
+from service.cli.progress import Reporter, bars
 from service.client.embedded import EmbeddedService
 from service.db.models import JobState
 from service.errors import InputError
@@ -85,8 +85,7 @@ def run(folder: Path, cases: Sequence[DemoCase] = CASES) -> list[Path]:
     except OSError as error:
         raise InputError(f"`--out`: {str(folder)!r} cannot be used: {error.strerror}") from error
     # Here first: several workers would otherwise each compile the same kernels on a first run.
-    with patience():
-        warm_up()
+    warm_up()
     with EmbeddedService(load_settings(database=f"sqlite:///{folder / 'demo.db'}")) as service:
         designs = _designs(service, cases)
         sweeps = _sweeps(service, cases)

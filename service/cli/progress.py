@@ -1,9 +1,8 @@
-"""Progress on a terminal: bars, and a word about a slow first run. In a pipe: nothing."""
+"""Progress on a terminal: bars. In a pipe: nothing."""
 
 from __future__ import annotations
 
 import sys
-import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import cache
@@ -11,9 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
-
-_PATIENCE_SECONDS = 4.0
-_FIRST_RUN = "still at it: a first run after an installation compiles its kernels, which takes about a minute"
 
 
 def on_terminal() -> bool:
@@ -49,7 +45,7 @@ def told_best(found: Mapping[str, Any]) -> str:
 
 
 class _WhenTold(Reporter):
-    """A bar that is there from its first report on; before it, people are told to be patient."""
+    """A bar that is there from its first report on."""
 
     def __init__(self, begin: Callable[[], Reporter | None]) -> None:
         self._begin = cache(begin)
@@ -78,11 +74,8 @@ def bar(label: str, counted: str = "points") -> Iterator[Reporter | None]:
         yield None
         return
     with ExitStack() as stack:
-        waiting = stack.enter_context(ExitStack())
-        waiting.enter_context(patience())
 
         def begin() -> Reporter | None:
-            waiting.close()
             return stack.enter_context(bars([label], counted))[0]
 
         yield _WhenTold(begin)
@@ -104,18 +97,3 @@ def bars(labels: Sequence[str], counted: str) -> Iterator[Sequence[Reporter | No
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         tasks = [progress.add_task(label, total=1.0, counted="", best="") for label in labels]
         yield [Reporter(progress, task, counted) for task in tasks]
-
-
-@contextmanager
-def patience() -> Iterator[None]:
-    """Say something on a terminal if the block takes long: it may be compiling."""
-    if not on_terminal():
-        yield
-        return
-    timer = threading.Timer(_PATIENCE_SECONDS, lambda: sys.stderr.write(f"stickslip: {_FIRST_RUN}\n"))
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()

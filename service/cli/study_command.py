@@ -22,6 +22,7 @@ from service.errors import InputError
 from service.jobs.study import Answer, Study, Watch, Writable
 from service.rendering.text import show
 from solver.errors import SettingError
+from solver.jit.beside import cost, prepare
 from solver.results.views import on_demand
 from solver.results.watch import stopped_by_interrupt
 
@@ -168,6 +169,7 @@ def command_of(study: type[Study]) -> Callable[..., None]:
         outputs = Outputs.asked(plot, out)
         scene = inputs.scene(name, values)
         asked = keys.read(given)
+        prepare(lambda: cost(study.NAME, scene, asked))
         if wrong := study.model_construct(**asked).issues(scene):
             raise refused(wrong, keys.flags)
         with keys.named(), watched(study) as watch:

@@ -141,7 +141,10 @@ async def live() -> Alive:
     return Alive()
 
 
-@router.get("/health/ready", responses={503: {"model": Health, "description": "It cannot work now."}})
+@router.get(
+    "/health/ready", response_model_exclude_none=True,
+    responses={503: {"model": Health, "description": "It cannot work now."}},
+)  # fmt: skip
 async def ready(context: InContext, response: Response) -> Health | Readiness:
     """Database, queue and workers are up; the details are for who may see them: where no key is needed, and
     with the scope `monitor`.

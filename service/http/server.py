@@ -140,12 +140,20 @@ def _config(app: FastAPI, settings: Settings) -> uvicorn.Config:
 def _begin_the_rest(app: FastAPI) -> None:
     """Start the processes of answers and previews when a worker is ready; make what the page asks for first.
 
-    Nothing is to delay readiness; who asks for either before gets it at once.
+    Nothing is to delay readiness; who asks for either before gets it at once. Where no kernels are compiled
+    yet both begin interpreted, at once, and anew when the workers have them.
     """
     service: Service = app.state.service
+    if service.compiling:
+        service.answers.begin()
+        service.previews.begin()
     while not service.queue.status().ready:
         if service.stopping.wait(_TICK_SECONDS):
             return
+    if service.compiling:
+        service.compiling = False
+        service.answers.renew()
+        service.previews.renew()
     service.answers.begin()
     prepare(app)
     service.previews.begin()

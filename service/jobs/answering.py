@@ -28,6 +28,7 @@ from service.jobs.registry import JobRequest, Registry, Resolve, RunOn, SceneSou
 from service.jobs.strict_json import JsonText, digest, encoded
 from service.jobs.studies.plan import Plan
 from service.jobs.study import Watch
+from solver.jit.beside import interpret
 
 PLAN, READ, TEXT, STORE, RESOLVE, PREVIEW = "plan", "read", "text", "store", "resolve", "preview"
 MEASURED, LOOK, EDIT, PARAMETERS = "measured", "look", "edit", "parameters"
@@ -222,7 +223,8 @@ def runs(jobs: Registry, previews: Registry) -> dict[str, RunOn]:
 
 
 def warm_up() -> None:
-    """Load and compile what the tasks need."""
+    """Load and compile what the tasks need; where nothing is compiled yet they are interpreted."""
+    interpret()
     import solver
     from solver.scene import toml
 

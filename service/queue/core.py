@@ -54,6 +54,7 @@ from service.uploads.uploads import Uploads
 from service.workers.answers import Answers
 from service.workers.executors import executor_of
 from service.workers.preview_workers import Previews
+from solver.jit import beside
 
 log = logging.getLogger("stickslip.service")
 
@@ -132,6 +133,8 @@ class Service:
         self._elsewhere: Elsewhere | None = None
         self._notices = None if self.database.exclusive else self._make_notices()
         self.stopping = threading.Event()
+        self.compiling = False
+        """Whether workers wait for their kernels, and what somebody waits for is interpreted."""
         self._open = False
 
     def _make_notices(self) -> Notices:
@@ -177,6 +180,10 @@ class Service:
     def start(self) -> None:
         """Open the database, start queue and workers; `open` lists the errors."""
         self.open()
+        self.compiling = beside.missing()
+        if self.compiling:
+            beside.begin()
+            beside.interpret()  # what this process loads, and does not compute with, waits for nobody
         try:
             self.queue.start()
         except BaseException:

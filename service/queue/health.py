@@ -12,16 +12,18 @@ from sqlalchemy.exc import SQLAlchemyError
 from service.db import revisions
 from service.db.engine import sqlite_note
 from service.queue.core import SOLVER_VERSION, Service
+from solver.jit.beside import told
 
 _PROBE_SECONDS = 2.0
 
 
 class Readiness(BaseModel):
-    """Whether the service takes and runs jobs, and no more."""
+    """Whether the service takes jobs and answers, and what it still starts, and no more."""
 
     model_config = ConfigDict(frozen=True)
 
     ready: bool
+    starting: str | None = None
 
 
 class Health(Readiness):
@@ -124,7 +126,7 @@ def _health(service: Service, trouble: list[str], counts: dict[str, int], versio
     if not service.queue.alive:
         trouble.append("the queue takes no jobs")
     workers = service.queue.status()
-    if not workers.ready:
+    if not workers.ready and not service.compiling:
         trouble.append(workers.trouble or "the worker processes are starting")
     notes = [
         sqlite_note() if service.database.exclusive else None,
@@ -132,6 +134,7 @@ def _health(service: Service, trouble: list[str], counts: dict[str, int], versio
     ]
     return Health(
         ready=not trouble,
+        starting=_starting(service),
         trouble=trouble,
         notes=[note for note in notes if note is not None],
         version=SOLVER_VERSION,
@@ -152,4 +155,12 @@ def readiness(service: Service) -> Readiness:
             return Readiness(ready=False)
     except (SQLAlchemyError, OSError):
         return Readiness(ready=False)
-    return Readiness(ready=service.queue.alive and service.queue.status().ready > 0)
+    up = service.compiling or service.queue.status().ready > 0
+    return Readiness(ready=service.queue.alive and up, starting=_starting(service))
+
+
+def _starting(service: Service) -> str | None:
+    """Say what is being started, as the page shows it; None when all is there."""
+    if not service.compiling:
+        return None
+    return f"Being compiled, once for this version: {told()}. Until then curves take longer and jobs wait."

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from dataclasses import replace
 from typing import Any
 
 from service.errors import (
@@ -34,6 +35,7 @@ WORKERS = 2
 _RETRY_SECONDS = 1
 _GRACE_SECONDS = 0.5
 _LONGEST_WAIT_SECONDS = 120.0
+_INTERPRETED = 20.0  # times as long one may take while kernels are interpreted
 _SUPERSEDED = "a newer preview of the same client took its place"
 
 
@@ -59,13 +61,21 @@ class Previews(WarmPool):
         memory_bytes: int | None = None,
         workers: int = WORKERS,
     ) -> None:
-        limits = ProcessLimits(memory_bytes=memory_bytes, processor_seconds=seconds + _GRACE_SECONDS)
+        limits = ProcessLimits(memory_bytes=memory_bytes)
         super().__init__(
             registry.runs(), registry.warm_up, workers=workers, grace_seconds=_GRACE_SECONDS, limits=limits
         )
         self.registry = registry
-        self._seconds = seconds
+        self._given_seconds = seconds
         self._served: list[str] = []
+
+    @property
+    def _seconds(self) -> float:
+        """Longest time one may take [s]: more of it while kernels are interpreted."""
+        return self._given_seconds * (_INTERPRETED if self.interprets else 1.0)
+
+    def _limits(self) -> ProcessLimits:
+        return replace(super()._limits(), processor_seconds=self._seconds + _GRACE_SECONDS)
 
     async def compute(
         self, kind: str, spec: dict[str, Any], client: str = "", owner: str = "", most: int | None = None

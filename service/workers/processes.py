@@ -28,6 +28,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from service.workers.worker import THREAD_LIMITS
+from solver.jit.beside import missing
 
 PRELOADED = "service.workers.preloaded"
 _OURS = "STICKSLIP_"
@@ -152,7 +153,8 @@ def _started(target: Callable[..., None], args: tuple[Any, ...], name: str) -> P
 def _context() -> BaseContext:
     """The way to make a process; from nothing too if settings were changed after the first one was made."""
     global _settings_of_the_first
-    if sys.platform != "linux":
+    # What others are forked off has compiled kernels; while there are none, each begins from nothing.
+    if sys.platform != "linux" or missing():
         return mp.get_context("spawn")
     settings = {name: value for name, value in os.environ.items() if name.startswith(_OURS)}
     if _settings_of_the_first is None:

@@ -18,6 +18,7 @@ from service.jobs.registry import RunOn, WarmUp
 from service.workers.base import Outcome, Stopped, Unwatched
 from service.workers.executors import LocalExecutor
 from service.workers.process_limits import ProcessLimits
+from solver.jit.beside import missing
 
 _SILENT = Pace(progress_seconds=3600.0, checkpoint_seconds=3600.0, checkpoint_bytes=0)
 
@@ -97,6 +98,7 @@ class WarmPool(Unwatched, ABC):
         self._running: dict[str, WarmTask] = {}
         self._executor: LocalExecutor | None = None
         self._closed = False
+        self.interprets = False
 
     @abstractmethod
     def _admit(self, asked: WarmTask) -> None:
@@ -105,6 +107,10 @@ class WarmPool(Unwatched, ABC):
     @abstractmethod
     def _next(self) -> WarmTask | None:
         """The one of those waiting whose turn it is, if one may begin; the pool's lock is held."""
+
+    def _limits(self) -> ProcessLimits:
+        """What each process that begins now may use."""
+        return self._process_limits
 
     @property
     def ready(self) -> int:
@@ -117,11 +123,20 @@ class WarmPool(Unwatched, ABC):
         with self._lock:
             if self._closed or self._executor is not None:
                 return
+            self.interprets = missing()
             self._executor = LocalExecutor(
                 self._runs, self._warm_up, workers=self._workers, grace_seconds=self._grace_seconds,
-                pace=_SILENT, limits=self._process_limits,
+                pace=_SILENT, limits=self._limits(),
             )  # fmt: skip
             self._executor.start(self)
+
+    def renew(self) -> None:
+        """Have new processes compute; what is computed now is begun again there."""
+        with self._lock:
+            old, self._executor = self._executor, None
+        if old is not None:
+            self.begin()
+            old.close()
 
     def close(self) -> None:
         """End the processes, and what they compute; whoever waits is told."""

@@ -12,7 +12,6 @@ by this way, which says nothing about whether there is one. It has at most `MOST
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +24,7 @@ from solver.continuation.kernels.pseudo_arclength import begin_walk
 from solver.continuation.settings import ContinuationSettings
 from solver.continuation.stretches import STRETCH, BranchStretches, control_of
 from solver.continuation.walk import walk
+from solver.jit.clock import clock
 from solver.jit.fourier import Real
 from solver.scene.parameter_paths import AMPLITUDE
 
@@ -84,7 +84,7 @@ def _followed(balance: Balance) -> tuple[Real | None, int]:
     if not least.converged:
         return None, least.iterations
     code, state = begin_walk(workspace.system, workspace.linear, workspace.point, control, least.u)
-    arc = BranchStretches(workspace, control, code, state, least.iterations, time.perf_counter())
+    arc = BranchStretches(workspace, control, code, state, least.iterations, clock())
     points, last = 0, None
     for last in walk(arc, STRETCH, 1.0):
         points += len(last.solutions)

@@ -6,7 +6,6 @@ caller time to watch and stop.
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from typing import Any
 
@@ -23,6 +22,7 @@ from solver.continuation.kernels.state import Control, Walk, walk_by_value
 from solver.continuation.segment import Stretch, rows_of, state_of
 from solver.continuation.settings import ContinuationSettings
 from solver.continuation.walk import Curve
+from solver.jit.clock import clock
 
 STRETCH = 64  # points between two looks at the caller, at most
 _SHORT_STRETCH = 4  # the first of them where a point may take long
@@ -76,7 +76,7 @@ class BranchStretches(Curve[Stretch]):
 
     def tried(self, size: float) -> tuple[Stretch | None, float]:
         """Return the next stretch, of no more than `size` points, and how many the one behind it may have."""
-        workspace, control, state, before = self._workspace, self._control, self._state, time.perf_counter()
+        workspace, control, state, before = self._workspace, self._control, self._state, clock()
         rows, springs = rows_of(workspace.balance, int(size)), workspace.springs.rows(int(size))
         filled = [*rows.values(), springs]
         code, count = walk_on(
@@ -95,7 +95,7 @@ class BranchStretches(Curve[Stretch]):
                 status = BranchStatus.RATCHETS
         stretch = balanced_part(workspace, self._stretch(rows, count, status))
         self._code, self._status, self._state = code, stretch.status, state if again is None else again
-        longer = min(2.0, _STRETCH_SECONDS / max(time.perf_counter() - before, 1e-9))
+        longer = min(2.0, _STRETCH_SECONDS / max(clock() - before, 1e-9))
         return stretch, min(STRETCH, max(1, int(size * longer)))
 
     def _stretch(self, rows: dict[str, Any], count: int, status: BranchStatus | None) -> Stretch:
@@ -105,7 +105,7 @@ class BranchStretches(Curve[Stretch]):
             newton_iterations=self._spent + int(numbers[walk_states.ITERATIONS]),
             rejected_steps=int(numbers[walk_states.REJECTED]),
             stepped_over=int(numbers[walk_states.STEPPED_OVER]),
-            seconds=time.perf_counter() - self._begun, walk=state_of(self._state),
+            seconds=clock() - self._begun, walk=state_of(self._state),
         )  # fmt: skip
 
 

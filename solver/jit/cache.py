@@ -2,8 +2,7 @@
 
 Numba looks only at the file a function stands in, so a caller would go on using the old machine code of a
 callee that changed in another file. The folder is therefore named by a hash of every kernel source: change
-one and all are compiled anew. Nothing else is asked of them, so that all copies of the same sources, wherever
-they lie and whenever they were written, share one folder. The machine code of kernels from outside the
+one and all are compiled anew (`solver.jit.folder`). The machine code of kernels from outside the
 package lies there too; it is that of one state of the file they stand in.
 
 Numba writes its index without a lock: of two processes that save at once, one may lose its entry, or find the
@@ -14,17 +13,18 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import os
-import stat
-import tempfile
+import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, ClassVar
 
 import llvmlite.binding
-import numba
-from numba.core import caching
+from numba.core import caching, event
 from numba.core.runtime import rtsys
+
+from solver.jit.clock import took
+from solver.jit.folder import folder
 
 try:
     import fcntl
@@ -32,43 +32,27 @@ except ImportError:  # Windows has no such lock
     fcntl = None  # type: ignore[assignment]
 
 
-def _source_hash() -> str:
-    """Return a hash of the kernels' sources and of what compiles them."""
-    solver = Path(__file__).parent.parent
-    digest = hashlib.sha256(numba.__version__.encode())
-    for source in (*sorted(solver.glob("jit/*.py")), *sorted(solver.glob("**/kernels/**/*.py"))):
-        digest.update(source.relative_to(solver).as_posix().encode() + source.read_bytes())
-    return digest.hexdigest()[:16]
+CACHE_FOLDER = str(folder())
 
 
-def _cache_folder() -> str:
-    """Return a writable folder for the machine code of exactly these sources."""
-    asked = os.environ.get("NUMBA_CACHE_DIR")
-    home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    for root in [asked] if asked else [home, None]:
-        try:
-            folder = (Path(root) / "stickslip-kernels" if root else _temporary()) / _source_hash()
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError:
-            continue
-        if os.access(folder, os.W_OK):
-            return str(folder)
-    return tempfile.mkdtemp(prefix="stickslip-kernels-")
+class _Compiling(event.Listener):
+    """Takes the time that a thread compiles out of what is reported."""
+
+    def __init__(self) -> None:
+        self._begun = threading.local()
+
+    def on_start(self, _event: object) -> None:
+        if (depth := getattr(self._begun, "depth", 0)) == 0:
+            self._begun.at = time.perf_counter()
+        self._begun.depth = depth + 1
+
+    def on_end(self, _event: object) -> None:
+        self._begun.depth -= 1
+        if self._begun.depth == 0:
+            took(time.perf_counter() - self._begun.at)
 
 
-def _temporary() -> Path:
-    """Return this user's own temporary folder; OSError if somebody else could put machine code there."""
-    if not hasattr(os, "getuid"):  # on Windows each user has a folder for temporary files
-        return Path(tempfile.gettempdir()) / "stickslip-kernels"
-    folder = Path(tempfile.gettempdir()) / f"stickslip-kernels-{os.getuid()}"
-    folder.mkdir(mode=0o700, exist_ok=True)
-    found = folder.lstat()
-    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o022:
-        raise PermissionError(f"{folder} is not this user's alone")
-    return folder
-
-
-CACHE_FOLDER = _cache_folder()
+event.register("numba:compile", _Compiling())
 
 
 @contextlib.contextmanager

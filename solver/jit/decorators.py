@@ -12,12 +12,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-import numba
+from solver.jit.way import WAY, Way
 
-from solver.jit import plain
-from solver.jit.plain import PLAIN
+if WAY is not Way.INTERPRETED:
+    import numba
 
-if not PLAIN:
+    from solver.jit import plain
+if WAY is Way.COMPILED:
     from solver.jit.cache import KernelCache
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -31,7 +32,9 @@ def compiled(function: _Function, *, linked: bool = True) -> _Function:
     One whose name begins with an underscore is for other kernels alone: without the code by which Python
     would call it, a tenth of the compilation is saved.
     """
-    if PLAIN:
+    if WAY is Way.INTERPRETED:
+        return function
+    if WAY is Way.PLAIN:
         return plain.apart(function)
     inner = function.__name__.startswith("_")
     kernel: Any = numba.njit(
@@ -51,7 +54,7 @@ def compiled(function: _Function, *, linked: bool = True) -> _Function:
 
 def kept(kernel: Any, function: Callable[..., Any]) -> None:
     """Have the machine code of a kernel that Numba compiles as it likes kept on disk."""
-    if not PLAIN:
+    if WAY is Way.COMPILED:
         kernel._cache = KernelCache(function)
 
 

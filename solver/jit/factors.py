@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-import numba
 import numpy as np
 
 from solver.jit import lapack_loading
 from solver.jit.fourier import Complex, Index, Real
-from solver.jit.plain import PLAIN
 from solver.jit.separate import apart
+from solver.jit.way import WAY, Way
 
 
 @apart
@@ -87,9 +86,11 @@ def own_inverse(matrix: Complex, inverse: Complex) -> bool:
     return True
 
 
-if PLAIN:
+if WAY is not Way.COMPILED:
     factors_of_large, invert_large = own_factors, own_inverse
 else:
+    import numba
+
     _int, _index, _doubles = numba.types.intc, numba.types.intp, numba.types.CPointer(numba.types.float64)
     _pivots = numba.types.CPointer(numba.types.int32)
     _getrf: Callable[..., int] = numba.core.types.ExternalFunction(

@@ -22,24 +22,21 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import types
-
+from solver.jit.forms import COMPLEX, FLOAT
 from solver.jit.fourier import Complex, Real
 from solver.jit.separate import numbered
 
-_FLOAT, _COMPLEX = types.float64, types.complex128
-_VECTOR, _TABLE = (types.Array(_FLOAT, dimensions, "C") for dimensions in (1, 2))
-_WAVE = types.Array(_COMPLEX, 1, "C")
+_VECTOR, _TABLE, _WAVE = (FLOAT, 1), (FLOAT, 2), (COMPLEX, 1)
 
 FORMS = {
-    "rate": ((_FLOAT, _FLOAT, _VECTOR, _VECTOR, _VECTOR), types.none),
-    "force": ((_FLOAT, _FLOAT, _VECTOR, _VECTOR), _FLOAT),
-    "step": ((_FLOAT, _FLOAT, _FLOAT, _FLOAT, _VECTOR, _VECTOR, _VECTOR), _FLOAT),
-    "complex_rate": ((_COMPLEX, _COMPLEX, _WAVE, _WAVE, _WAVE), types.none),
-    "complex_force": ((_COMPLEX, _COMPLEX, _WAVE, _WAVE), _COMPLEX),
-    "complex_step": ((_COMPLEX, _COMPLEX, _COMPLEX, _COMPLEX, _WAVE, _WAVE, _WAVE), _COMPLEX),
-    "rate_slopes": ((_FLOAT, _FLOAT, _VECTOR, _VECTOR, _TABLE), types.none),
-    "step_slopes": ((_FLOAT, _FLOAT, _FLOAT, _FLOAT, _VECTOR, _VECTOR, _VECTOR, _TABLE), types.none),
+    "rate": ((FLOAT, FLOAT, _VECTOR, _VECTOR, _VECTOR), None),
+    "force": ((FLOAT, FLOAT, _VECTOR, _VECTOR), FLOAT),
+    "step": ((FLOAT, FLOAT, FLOAT, FLOAT, _VECTOR, _VECTOR, _VECTOR), FLOAT),
+    "complex_rate": ((COMPLEX, COMPLEX, _WAVE, _WAVE, _WAVE), None),
+    "complex_force": ((COMPLEX, COMPLEX, _WAVE, _WAVE), COMPLEX),
+    "complex_step": ((COMPLEX, COMPLEX, COMPLEX, COMPLEX, _WAVE, _WAVE, _WAVE), COMPLEX),
+    "rate_slopes": ((FLOAT, FLOAT, _VECTOR, _VECTOR, _TABLE), None),
+    "step_slopes": ((FLOAT, FLOAT, FLOAT, FLOAT, _VECTOR, _VECTOR, _VECTOR, _TABLE), None),
 }
 """The types of the arguments and of the result of every function a law may have."""
 

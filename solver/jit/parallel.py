@@ -15,9 +15,10 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 
-from solver.jit.plain import PLAIN
+from solver.jit.way import WAY, Way
 
-if not PLAIN:
+if WAY is Way.COMPILED:
+    from solver.jit.beside import note
     from solver.jit.slots import make, watched
 
 MOST_PROCESSES = 4  # each compiles the short kernels for itself, and takes 600 MB at most
@@ -47,7 +48,7 @@ def compile_together(
     Exception
         What a call or the compilation of a kernel raised, in whatever process.
     """
-    if PLAIN:  # nothing is kept that another process could use
+    if WAY is not Way.COMPILED:  # nothing is kept that another process could use
         for call in calls:
             call()
         return
@@ -118,6 +119,7 @@ class _Team:
         self._lock = threading.Lock()
         self._seen: set[bytes] = set()
         self._open: dict[Callable[[], object] | bytes, Future[list[bytes]] | None] = {}
+        self._done = 0
 
     def hand_out(self, tasks: Sequence[Callable[[], object] | bytes]) -> None:
         """Offer tasks to the pool."""
@@ -137,7 +139,15 @@ class _Team:
     def _more(self, future: Future[list[bytes]]) -> None:
         """Offer what a process found; what it raised is raised where its task is waited for."""
         if not future.cancelled() and future.exception() is None:
+            self._tell()
             self.hand_out(future.result())
+
+    def _tell(self) -> None:
+        """Tell other processes that a kernel more is compiled."""
+        with self._lock:
+            self._done += 1
+            done, found = self._done, max(len(self._seen), self._done)
+        note(done, found)
 
     def called(self, name: bytes) -> None:
         """Offer the kernel to the pool."""
@@ -153,6 +163,7 @@ class _Team:
         with self._lock:
             future = self._open.pop(name, None)
         if future is None or future.cancel():
+            self._tell()
             return
         while not future.done() and self._help():
             pass
@@ -171,6 +182,7 @@ class _Team:
             make(mine)
         else:
             mine()
+        self._tell()
         return True
 
     def finish(self) -> None:

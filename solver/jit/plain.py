@@ -6,17 +6,16 @@ disk: a process compiles for minutes. What is called by its number is called thr
 
 from __future__ import annotations
 
-import importlib
-import os
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
 from numba import types
 
+from solver.jit.forms import Form, of_numba
+from solver.jit.interpreted import Kernels
+
 _Function = TypeVar("_Function", bound=Callable[..., Any])
-PLAIN = os.environ.get("STICKSLIP_PLAIN_KERNELS", "") not in ("", "0")
-"""Whether kernels are compiled this way: slow to start, nothing is kept on disk, but of any Numba."""
 FASTMATH = {"reassoc", "contract"}
 
 
@@ -26,41 +25,15 @@ def apart(function: _Function) -> _Function:
     return kernel
 
 
-class _Kernels:
-    """The kernels of a contract by their numbers."""
-
-    def __init__(self, known: tuple[str, ...]) -> None:
-        self._names, self._made = list(known), dict[int, Any]()
-
-    def number(self, kernel: str) -> int:
-        """Return the number of a kernel, ``module:NAME``."""
-        if kernel not in self._names:
-            self._names.append(kernel)
-        return self._names.index(kernel)
-
-    def put(self, number: int, kernel: Any) -> None:
-        """Have a function of the contract called by a number."""
-        self._made[number] = kernel
-
-    def call(self, number: int, arguments: tuple[Any, ...]) -> Any:
-        """Call a kernel."""
-        if number not in self._made:
-            if number >= len(self._names):
-                raise RuntimeError("no kernel of the contract has this number in this process")
-            module, _, name = self._names[number].partition(":")
-            self._made[number] = getattr(importlib.import_module(module), name)
-        return self._made[number](*arguments)
-
-
-def numbered(arguments: tuple[types.Type, ...], result: types.Type, known: tuple[str, ...] = ()) -> Any:
+def numbered(arguments: tuple[Form, ...], result: Form, known: tuple[str, ...] = ()) -> Any:
     """Make the function it decorates the contract of kernels called by number, see `solver.jit.tables`."""
     del arguments
-    kernels = _Kernels(known)
+    kernels, returned = Kernels(known), of_numba(result)
     by_number = kernels.call
 
     def decorate(function: _Function) -> _Function:
         del function
-        if result == types.none:
+        if returned == types.none:
 
             def call(number, *given):  # type: ignore[no-untyped-def]
                 with numba.objmode():
@@ -68,7 +41,7 @@ def numbered(arguments: tuple[types.Type, ...], result: types.Type, known: tuple
         else:
 
             def call(number, *given):  # type: ignore[no-untyped-def]
-                with numba.objmode(found=result):
+                with numba.objmode(found=returned):
                     found = by_number(number, given)
                 return found  # noqa: RET504 - a block of Python may not return
 

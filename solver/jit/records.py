@@ -10,6 +10,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.jit.way import WAY, Way
+
 Records: TypeAlias = NDArray[np.void]
 Row: TypeAlias = Any  # one of them
 
@@ -18,4 +20,6 @@ def record(**fields: Any) -> np.dtype[np.void]:
     """Return the type of records with these fields: float, int, complex, or (one of them, how many)."""
     # Numba reads what is aligned in one instruction.
     forms = [(name, *(form if isinstance(form, tuple) else (form,))) for name, form in fields.items()]
-    return np.dtype(forms, align=True)
+    made = np.dtype(forms, align=True)
+    # Python finds the fields of such a row by their names, as Numba does.
+    return np.dtype((np.record, made)) if WAY is Way.INTERPRETED else made

@@ -1,16 +1,18 @@
 """Kernels compiled on their own (`solver.jit.slots`), or called by numbers (`solver.jit.tables`).
 
-In the plain way the first are as all others, and Python calls the second.
+In the plain way the first are as all others, and Python calls the second; interpreted, all are Python.
 """
 
 from __future__ import annotations
 
-from solver.jit.plain import PLAIN
+from solver.jit.way import WAY, Way
 
-if PLAIN:
-    from solver.jit.plain import apart, numbered
-else:
+if WAY is Way.COMPILED:
     from solver.jit.slots import apart
     from solver.jit.tables import numbered
+elif WAY is Way.PLAIN:
+    from solver.jit.plain import apart, numbered
+else:
+    from solver.jit.interpreted import apart, numbered
 
 __all__ = ["apart", "numbered"]

@@ -21,6 +21,7 @@ from numba.core import cgutils
 from numba.core.extending import lower_builtin, type_callable
 from numba.core.typing import signature
 
+from solver.jit.forms import Form, of_numba
 from solver.jit.slots import call_at, loaded, made_address, watching
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -79,26 +80,28 @@ class _Table:
         return ctypes.addressof(self._addresses)
 
 
-def numbered(arguments: tuple[types.Type, ...], result: types.Type, known: tuple[str, ...] = ()) -> Any:
+def numbered(arguments: tuple[Form, ...], result: Form, known: tuple[str, ...] = ()) -> Any:
     """Make the function it decorates, whose body is never run, the contract of kernels called by number.
 
     Parameters
     ----------
-    arguments, result : types of the kernels; arrays are contiguous.
+    arguments, result : types of the kernels, see `solver.jit.forms`.
     known : kernels whose numbers, from 0 on, are the same in every process.
 
     The function takes the number and the arguments. A number nobody asked for is a RuntimeError.
     """
 
+    wanted, returned = [of_numba(one) for one in arguments], of_numba(result)
+
     def decorate(function: _Function) -> _Function:
-        form = signature(result, *arguments)
+        form = signature(returned, *wanted)
         table: Any = _Table(function, form, known)
 
         def typed(_context: Any) -> Any:
             def of(number: types.Type, *given: types.Type) -> Any:
-                fits = isinstance(number, types.Integer) and len(given) == len(arguments)
-                if fits and all(map(_same, given, arguments)):
-                    return signature(result, types.int64, *given)
+                fits = isinstance(number, types.Integer) and len(given) == len(wanted)
+                if fits and all(map(_same, given, wanted)):
+                    return signature(returned, types.int64, *given)
                 return None
 
             of.pysig = inspect.signature(function)  # type: ignore[attr-defined]

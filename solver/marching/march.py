@@ -8,7 +8,6 @@ scheme.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from numbers import Integral, Real
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
 from solver.errors import SettingError
+from solver.jit.clock import clock
 from solver.marching import moreau
 from solver.marching.contacts import as_sparse, rows
 from solver.marching.equations import MarchEquations, equations_of_motion
@@ -127,7 +127,7 @@ def march(
         An argument is out of its range, a degree of freedom or contact of the start is unknown, or has no
         friction, or the scene has a contact with a sampled circular limit.
     """
-    begin = time.perf_counter()
+    begin = clock()
     _check(frequency_hz, tolerance, max_periods)
     if start is not None and tractions is not None:
         raise SettingError("tractions", dict(tractions), "must be those of `start` where that is given")
@@ -145,7 +145,7 @@ def march(
         found = _twice(plan, begins, steps, names, frequency_hz)
     if scene.observe.harmonic is not None:
         found = of_harmonic(found, scene.observe.harmonic)
-    return replace(found, seconds=time.perf_counter() - begin)
+    return replace(found, seconds=clock() - begin)
 
 
 def marched(

@@ -7,7 +7,6 @@ the frequency, and along an engine-order line what follows the speed, change wit
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,6 +16,7 @@ import numpy as np
 
 from solver import arrays
 from solver.errors import SettingError
+from solver.jit.clock import clock
 from solver.marching.base import base_begins
 from solver.marching.equations import MarchEquations, equations_of_motion
 from solver.marching.kernels import state as kernel
@@ -90,7 +90,7 @@ def transient(
     SettingError
         An argument out of its range, a rigid contact.
     """
-    began = time.perf_counter()
+    began = clock()
     if len(rates):
         single = partial(
             transient, scene, begin_hz=begin_hz, end_hz=end_hz, ramp_seconds=ramp_seconds, start=start,
@@ -136,7 +136,7 @@ def _at_rates(
     worst = next((one.status for one in found if not one.reached), TransientStatus.FINISHED)
     return replace(
         found[-1], rates=np.array(order[: len(found)]), status=worst,
-        rates_max_abs=np.array([one.max_abs for one in found]), seconds=time.perf_counter() - began,
+        rates_max_abs=np.array([one.max_abs for one in found]), seconds=clock() - began,
     )  # fmt: skip
 
 
@@ -400,5 +400,5 @@ def _result(
         time=found.time[seen], frequency_hz=found.frequency_hz[seen], high=found.high[seen],
         low=found.low[seen], begin_hz=first.begin_hz, end_hz=first.end_hz, ramp_seconds=first.seconds,
         ring_down_seconds=sum(each.seconds for each in rest), steps_per_period=found.steps,
-        error_estimate=error, seconds=time.perf_counter() - began,
+        error_estimate=error, seconds=clock() - began,
     )  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +19,7 @@ from solver.certificate.certificate import (
     tried,
 )
 from solver.errors import SettingError
+from solver.jit.clock import clock
 from solver.jit.fourier import to_complex
 from solver.linear.assembly import linear_model
 from solver.modes.limit_cycles import LimitCycle
@@ -59,7 +59,7 @@ def certify_cycle(
     MissingExtraError
         Without python-flint.
     """
-    begun, still = time.perf_counter(), scene.with_values({"excitation.amplitude": 0.0})
+    begun, still = clock(), scene.with_values({"excitation.amplitude": 0.0})
     check_certifiable(still, rigid=False)
     from solver.certificate.proof_work import allowed
 

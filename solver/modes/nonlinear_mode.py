@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
@@ -13,6 +12,7 @@ import numpy as np
 from solver.balance.balance import Balance, build, check_harmonics
 from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.errors import SettingError, check_count
+from solver.jit.clock import clock
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
 from solver.modes.curve import follow
@@ -72,7 +72,7 @@ def nonlinear_mode(
     SettingError
         A mode, amplitudes, nodal diameter or harmonics that cannot be, each with what would be right.
     """
-    begun = time.perf_counter()
+    begun = clock()
     low, high = (math.log(each) for each in check_amplitudes(amplitudes))
     check_count("most_points", most_points, 1)
     problem = pose(scene, mode, nodal_diameter, harmonics)

@@ -13,7 +13,6 @@ resonance they count (at 29 : 41 the sum 15 f₁ − 10 f₂ is 0.5 % of the mot
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -27,6 +26,7 @@ from solver.balance.simplifications import even_harmonics_reason
 from solver.balance.workspace import Workspace
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.errors import SettingError
+from solver.jit.clock import clock
 from solver.jit.fourier import Integer
 from solver.response.quasi_periodic_result import LINES, QuasiPeriodic, QuasiPeriodicStatus
 from solver.response.solution import MEAN_UNDETERMINED, Solution
@@ -113,7 +113,7 @@ def quasi_periodic(
     SettingError
         An argument out of its range, rigid contacts, a scene whose force has no single DOF and none is given.
     """
-    began = time.perf_counter()
+    began = clock()
     check(scene, frequency_hz, second_hz, harmonics, turns, tolerance)
     second = second_force(scene, amplitude=amplitude, dof=dof, phase=phase, engine_order=engine_order)
     question = Question(scene.at_frequency(frequency_hz), second, frequency_hz, second_hz, harmonics)
@@ -294,7 +294,7 @@ class Question:
     ) -> tuple[Solution, ContactMotions | None]:
         """Solve the balance of p and q turns, from motions known to be near."""
         scene, base, highest = self._at(p, q), self.first_hz / p, self.harmonics * max(p, q)
-        begun = time.perf_counter()
+        begun = clock()
         workspace = Workspace.of(build(scene, harmonics=highest))
         guess = None if start is None else start.guess(workspace.balance, p, q)
         found = solve_from_nothing(workspace, 2.0 * math.pi * base, guess)
@@ -331,5 +331,5 @@ class Question:
             section_velocity=moving.at(still, angle), turns=turns,
             contacts={each.name: each.state.value for each in looks[-1].nearest.contacts} if looks else {},
             flags=looks[-1].nearest.flags if looks else (), n_harmonics=self.harmonics,
-            error_estimate=change, seconds=time.perf_counter() - began,
+            error_estimate=change, seconds=clock() - began,
         )  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated, ClassVar
@@ -12,6 +11,7 @@ import numpy as np
 
 from solver.arrays import Real
 from solver.errors import SettingError, check_count
+from solver.jit.clock import clock
 from solver.response.quasi_periodic import Question, TorusWatch, check, respond, second_force
 from solver.response.quasi_periodic_result import QuasiPeriodic, QuasiPeriodicStatus
 from solver.results.base import Drawn
@@ -103,7 +103,7 @@ def quasi_periodic_curve(
     SettingError
         As `quasi_periodic`; ends that are equal, or points that are no whole number from 2 on.
     """
-    began = time.perf_counter()
+    began = clock()
     hertz = curve_points(frequency_hz, to_hz, points)
     for each in hertz:
         if each != second_hz:
@@ -119,7 +119,7 @@ def quasi_periodic_curve(
             continue
         watch = TorusWatch(part_of(on_progress, i / points, (i + 1) / points, i), should_stop)
         question = Question(scene.at_frequency(f), second, f, second_hz, harmonics)
-        one, near = respond(question, turns, tolerance, start, watch, time.perf_counter())
+        one, near = respond(question, turns, tolerance, start, watch, clock())
         start = near or start
         found.append(one)
     return _curve(scene, hertz, second_hz, found, harmonics, began)
@@ -161,5 +161,5 @@ def _curve(
         first_amplitude=column("first_amplitude"), second_amplitude=column("second_amplitude"),
         error_estimate=column("error_estimate"), known=known,
         repeats=tuple(one is not None and one.repeats for one in every), n_harmonics=harmonics,
-        seconds=time.perf_counter() - began,
+        seconds=clock() - began,
     )  # fmt: skip

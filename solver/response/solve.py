@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -23,6 +22,7 @@ from solver.continuation.branches.symmetry_breaking import assumed_flags, seen
 from solver.continuation.extrema.error_estimate import UNKNOWN, truncation_error
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.jit import fourier
+from solver.jit.clock import clock
 from solver.jit.fourier import Real
 from solver.linear.condensation import loose_ports
 from solver.linear.modal import undamped_resonance
@@ -67,7 +67,7 @@ def solve(
     SettingError
         A bad frequency, number of harmonics or accuracy; a scene that has no place in an exact solution.
     """
-    begun = time.perf_counter()
+    begun = clock()
     check_frequency("frequency_hz", frequency_hz)
     scene = scene.at_frequency(frequency_hz)
     omega = 2.0 * math.pi * frequency_hz
@@ -92,7 +92,7 @@ def solve(
         # Loaded here: it brings the kernels of a walk along, which an answer does without.
         from solver.continuation.endings import too_stiff
 
-        failed = _failure(workspace.balance, frequency_hz, found, time.perf_counter() - begun)
+        failed = _failure(workspace.balance, frequency_hz, found, clock() - begun)
         if not found.ratchets and (workspace.law_fails(omega) or workspace.law_fails(omega, found.u)):
             failed = replace(failed, status=SolutionStatus.LAW_FAILED)
         elif failed.status is SolutionStatus.NOT_CONVERGED and too_stiff(workspace, omega, NEARBY * omega):
@@ -118,12 +118,12 @@ def describe(
     balance = workspace.balance
     omega = 2.0 * math.pi * frequency_hz
     if resonates_undamped(balance, omega, omega):
-        failed = _failure(balance, frequency_hz, found, time.perf_counter() - begun)
+        failed = _failure(balance, frequency_hz, found, clock() - begun)
         return replace(failed, status=SolutionStatus.UNDAMPED)
     error = truncation_error(workspace, found.u, omega) if estimated else UNKNOWN
     measures = workspace.measure(found.u, omega)
     if measures is None:
-        return _failure(balance, frequency_hz, found, time.perf_counter() - begun)
+        return _failure(balance, frequency_hz, found, clock() - begun)
     contacts = contact_responses(workspace, found.u, omega)
     high, _, low, _ = extremes(balance.system, measures.observed)
     observed = fourier.to_full(measures.observed, balance.system.ks, balance.highest_harmonic)
@@ -156,7 +156,7 @@ def describe(
         flags=flags_of(contacts, mean_open=mean_open, half_range_open=open_anyway or another),
         error_estimate=error.half_peak_to_peak if mean_open else error.max_abs,
         mean_range=(math.nan, math.nan) if nothing_holds else history.mean_range,
-        seconds=time.perf_counter() - begun,
+        seconds=clock() - begun,
     )
 
 
@@ -187,7 +187,7 @@ def _described(branch: Branch, at: float, u: Real) -> Solution:
         effects = replace(balance.effects, even_harmonics=int(balance.system.ks[0]) == 0)
         balance = build(scene, harmonics=balance.n_harmonics, effects=effects)
     found = PointSolution(converged=True, u=u, iterations=0, residual=0.0)
-    return describe(Workspace.of(balance), found, frequency_hz, time.perf_counter(), estimated=False)
+    return describe(Workspace.of(balance), found, frequency_hz, clock(), estimated=False)
 
 
 def _nothing_holds_a_part(workspace: Workspace) -> bool:

@@ -15,7 +15,6 @@ slider), that is said, and the utilisation is that of the response as it was fou
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
@@ -32,6 +31,7 @@ from solver.continuation.branch import Branch
 from solver.continuation.peaks import Peak
 from solver.errors import SettingError
 from solver.jit import fourier
+from solver.jit.clock import clock
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.model import LinearModel
@@ -99,7 +99,7 @@ class WorstMean:
     def solution(self, u: Real, at_hz: float) -> Solution:
         """Return the response with flags and the range of its mean."""
         found = PointSolution(converged=True, u=u, iterations=0, residual=0.0)
-        return describe(self._workspace, found, at_hz, time.perf_counter(), estimated=False)
+        return describe(self._workspace, found, at_hz, clock(), estimated=False)
 
     def solved(self, at_hz: float, guess: Real) -> Real | None:
         """Return the solution at a frequency; None if none is found."""

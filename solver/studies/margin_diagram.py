@@ -9,7 +9,6 @@ Where a mean is free, U is that of the worst mean (`solver.response.worst_mean`)
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
@@ -22,6 +21,7 @@ from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.peaks import Peak
 from solver.errors import SettingError, at
+from solver.jit.clock import clock
 from solver.response.worst_mean import WorstMeanSlopes, used_most
 from solver.results.known import Known
 from solver.results.units import STRESS_UNITS
@@ -154,7 +154,7 @@ def margin_diagram(
     SettingError
         Bad ends, points or values, or a `limit` beside strengths.
     """
-    begun = time.perf_counter()
+    begun = clock()
     every = checked_dampers(scene, dampers)
     levels = checked_levels(scene, start, stop, points, limit)
     check_harmonics(harmonics)
@@ -188,7 +188,7 @@ def margin_diagram(
         unit="Pa" if strengths else scene.observed_unit, level=levels,
         level_unit=parameter_of(scene, AMPLITUDE).unit, stress=stress, used=used, allowed=tuple(found),
         n_harmonics=harmonics, highest=tuple(parts), status=status,
-        seconds=time.perf_counter() - begun,
+        seconds=clock() - begun,
     )  # fmt: skip
 
 

@@ -7,12 +7,12 @@ order and on any number of machines.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 from solver.continuation.branch import Branch, BranchStatus
 from solver.errors import SettingError, check_count
+from solver.jit.clock import clock
 from solver.response.known import relative_sum
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.parts import LumpedStructure, Mistuning
@@ -80,7 +80,7 @@ def mistuning_study(
         The scene is not cyclic, a part or DOF it does not have, factors that are not above 0, a bad number of
         samples, range or number of harmonics.
     """
-    begun = time.perf_counter()
+    begun = clock()
     names = (of,) if isinstance(of, str) else tuple(of)
     disk_factors(scene, names, spread, samples, seed)  # refuses what cannot be drawn
     asked = should_stop or (lambda: False)
@@ -99,7 +99,7 @@ def mistuning_study(
     disks, branches, stopped = _until_stopped(drawn, tuned, asked)
     study = joined_study(
         scene, of=names, spread=spread, seed=seed, harmonics=harmonics, tuned=tuned, disks=disks,
-        seconds=time.perf_counter() - begun,
+        seconds=clock() - begun,
     )  # fmt: skip
     return replace(study, branches=branches, status=MistuningStatus.STOPPED if stopped else study.status)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
@@ -15,6 +14,7 @@ from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.continuation.parameter_scale import Scale, scale_of
 from solver.errors import SettingError, check_count
+from solver.jit.clock import clock
 from solver.jit.fourier import Integer, Real
 from solver.response import band_end
 from solver.response.known import known_of_solution
@@ -154,7 +154,7 @@ class MapGrid:
         on_progress : called with (share of the strip done, its points so far).
         should_stop : asked between rows.
         """
-        begun, spent = time.perf_counter(), 0
+        begun, spent = clock(), 0
         values, omegas = self.scale.spaced(self.steps), 2.0 * math.pi * self.band
         table = np.full((last - first, self.frequencies, ROW_VALUES), np.nan)
         before: tuple[Real, Integer] | None = None
@@ -172,7 +172,7 @@ class MapGrid:
                 on_progress(done / (last - first), done * self.frequencies)
         return Strip(
             first=first, values=table, newton_iterations=spent, stopped=stopped,
-            seconds=time.perf_counter() - begun,
+            seconds=clock() - begun,
         )  # fmt: skip
 
     def joined(self, strips: Sequence[Strip], ridge: PeakTrack | None = None) -> ResponseMap:

@@ -41,7 +41,7 @@ def test_the_conda_environment_holds_what_the_package_needs() -> None:
     for each in PROJECT["dependencies"]:
         name = re.match(r"[A-Za-z0-9-]+", each)
         assert name is not None
-        wanted.append(CONDA_NAMES.get(name[0], name[0]) + each[name.end() :])
+        wanted.append(CONDA_NAMES.get(name[0], name[0]) + each[name.end() :].partition(";")[0])
     assert plain == [f"python{PROJECT['requires-python']}", "pip", *wanted]
     # The package itself, and nothing beside what conda installed.
     assert found["dependencies"][-1] == {"pip": ["--no-deps", "-e ."]}

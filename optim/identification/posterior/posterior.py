@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
@@ -23,6 +22,7 @@ from optim.identification.reading import Given, read_data
 from optim.identification.unknowns import read_unknowns
 from optim.problem.variables import Real
 from solver.balance.parameter import resolve
+from solver.jit.clock import clock
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 
@@ -69,7 +69,7 @@ def posterior(
     DataError, DesignError, SettingError
         As `identify`; data without noise when none is given.
     """
-    begun = time.perf_counter()
+    begun = clock()
     known = read_unknowns(scene, unknowns, scaling, priors)
     runs = Runs(scene, read_data(scene, data, known.paths), known, sampling.harmonics)
     found = search(
@@ -81,7 +81,7 @@ def posterior(
         nothing = PosteriorStatus.STOPPED if stopped else PosteriorStatus.NO_FIT
         return _result(runs, _none(len(known)), nothing, "", math.nan, begun)
     result = sampled(runs, found.best, sampling)
-    return replace(result, seconds=time.perf_counter() - begun)
+    return replace(result, seconds=clock() - begun)
 
 
 def sampled(runs: Runs, best: LocalFit, sampling: Sampling) -> Posterior:
@@ -92,7 +92,7 @@ def sampled(runs: Runs, best: LocalFit, sampling: Sampling) -> Posterior:
     DesignError
         The data have no noise, and none was given.
     """
-    begun = time.perf_counter()
+    begun = clock()
     if best.level <= LEAST_LEVEL:
         raise DesignError("noise", sampling.noise, "must be given: the data show none")
     level_known = best.level == 1.0
@@ -171,5 +171,5 @@ def _result(
         log_evidence=weighted.log_evidence if weighted is not None and known else math.nan,
         log_evidence_error=weighted.log_evidence_error if weighted is not None and known else math.nan,
         pareto_k=math.nan if weighted is None else weighted.pareto_k, misfit=misfit, noise=noise,
-        evaluations=runs.evaluations, seconds=time.perf_counter() - begun,
+        evaluations=runs.evaluations, seconds=clock() - begun,
     )  # fmt: skip

@@ -14,7 +14,6 @@ m too, and p(t) = 1 up to the deviations of the bounds (A. Gelman et al., Bayesi
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -33,6 +32,7 @@ from optim.identification.unknowns import Unknowns, read_unknowns
 from optim.problem.variables import Real
 from solver.arrays import FloatOrNaN
 from solver.balance.parameter import resolve
+from solver.jit.clock import clock
 from solver.results.base import Drawn
 from solver.results.views import Data, Views
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
@@ -113,7 +113,7 @@ def reassemblies(
     DataError, DesignError, SettingError
         As `posterior`; fewer than three assemblies, or `varied` that are no unknowns.
     """
-    begun = time.perf_counter()
+    begun = clock()
     known = read_unknowns(scene, unknowns, scaling, None)
     if isinstance(data, (str, Mapping)) or len(data) < _FEWEST:
         raise DesignError(
@@ -171,7 +171,7 @@ def population(
         scene=scene.name, status=status, names=names, varied=tuple(varied), spreads=told,
         middles=tuple(Marginal.of(name, units[i], values[:, i]) for i, name in enumerate(names)),
         samples=np.array([unknowns.values(one) for one in inside]).reshape(len(inside), n), pareto_k=k,
-        assemblies=tuple(found), seconds=time.perf_counter() - begun,
+        assemblies=tuple(found), seconds=clock() - begun,
     )  # fmt: skip
 
 

@@ -24,6 +24,7 @@ from service.cli.options.parameters import Command, keyword, parameters_of, with
 from service.errors import InputError
 from service.jobs.common.scenes import UPLOAD, Place, named_files, with_named
 from solver.errors import Issue, SceneError, SettingError
+from solver.jit.beside import cost, prepare
 from solver.scene.toml import TomlError, read_toml
 
 if TYPE_CHECKING:
@@ -174,9 +175,12 @@ def posed(told: Description, study: type[ProblemRequest]) -> tuple[Scene, dict[s
 
     request = checked(told, study)
     scene = _with_values(told, _scene(told), request)
+    given = arguments(request)
+    # Before kernels are loaded, which what is wrong with a problem is found by.
+    prepare(lambda: cost(study.NAME, scene, given))
     if issues := request.issues(scene):
         raise told.refusal(issues)
-    return scene, arguments(request)
+    return scene, given
 
 
 def checked(told: Description, model: type[ProblemRequest]) -> ProblemRequest:

@@ -8,10 +8,12 @@ import optim
 import solver
 from service.jobs.registry import Registry
 from service.jobs.study import Study, study_named
+from solver.jit.beside import ready
 
 
 def warm_up() -> None:
     """Load the numerical packages and the compiled loops, so that the first job does not wait for them."""
+    ready()  # who computes for others computes compiled
     scene = solver.load_scene("two-dof")
     solver.solve(scene, frequency_hz=scene.observe.band[0], harmonics=3)
     solver.sweep(scene, harmonics=3)

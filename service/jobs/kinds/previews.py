@@ -41,6 +41,7 @@ from service.jobs.studies.solve import solve_result
 from solver.continuation.branch import AnyBranch
 from solver.continuation.certificate import PeakCertificate
 from solver.errors import Issue
+from solver.jit.beside import interpret
 from solver.scene.descriptions import DAMPER_LOAD
 from solver.scene.scene import Scene
 
@@ -217,7 +218,8 @@ def _states(names: list[str], codes: list[int]) -> dict[str, str]:
 
 
 def warm_up() -> None:
-    """Load and compile what previews need."""
+    """Load and compile what previews need; where nothing is compiled yet they are interpreted."""
+    runs = (run_point,) if interpret() else (run_sweep, run_sensitivities, run_limits, run_point, run_shape)
     scene = solver.load_scene("two-dof")
 
     def nothing(*_: object) -> bool:
@@ -233,7 +235,7 @@ def warm_up() -> None:
         "motion": None,
         "nodal_diameter": None,
     }
-    for run in (run_sweep, run_sensitivities, run_limits, run_point, run_shape):
+    for run in runs:
         run(spec, Silent(), nothing)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,6 +20,7 @@ from service.jobs.parts import Division, JobPart, PartOutput, PartStoppedError
 from service.jobs.registry import Flag, JobKind
 from service.jobs.study import Answer, Study
 from solver.errors import Issue, SceneError, SettingError
+from solver.jit.clock import clock
 
 if TYPE_CHECKING:
     from solver import BladePeaks
@@ -170,7 +170,7 @@ def run_part(
     from service.jobs.common.records import packed, sweep_records
     from solver.studies.mistuning import without_mistuning, worst_branch
 
-    scene, begun = stored_scene(spec), time.perf_counter()
+    scene, begun = stored_scene(spec), clock()
     tuned = bool(part.get("tuned"))
     disks = range(1) if tuned else range(part["first"], part["last"])
     found: list[BladePeaks] = []
@@ -206,7 +206,7 @@ def run_part(
         result={
             "dof": found[0].dof, "measured": found[0].measured.to_json(), "status": status, "sweeps": sweeps,
             "known": [peaks.highest.to_json() for peaks in found],
-            "largest": 0.0 if worst is None else worst.largest, "seconds": time.perf_counter() - begun,
+            "largest": 0.0 if worst is None else worst.largest, "seconds": clock() - begun,
         },
         arrays=arrays, points=0 if tuned else len(found), final=tuned and worst is None,
     )  # fmt: skip

@@ -1,7 +1,7 @@
 // The page of stickslip: projects, scenes and runs at the left, one scene with its answer and views beside them.
 
 import { asOneStep, lastWritten, read, state, write } from "./base/address.js";
-import { Problem, patiently, post } from "./network/api.js";
+import { Problem, patiently, post, watchStart } from "./network/api.js";
 import { byId, dropsOn, el, show } from "./base/dom.js";
 import { startInterference } from "./disk/interference.js";
 import { startAnswer } from "./views/answer.js";
@@ -235,6 +235,7 @@ async function begin() {
 async function start() {
   startTheme();
   startNotices();
+  watchStart();
   startLogin();
   await finishLogin();
   read();

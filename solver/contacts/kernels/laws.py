@@ -26,25 +26,23 @@ none that it has no second derivatives.
 
 from __future__ import annotations
 
-from numba import from_dtype, types
-
 from solver.contacts.kernels.columns import KERNELS, SECOND_KERNELS
 from solver.contacts.kernels.stick_slip_events import SEGMENT
 from solver.jit.decorators import compiled
+from solver.jit.forms import FLOAT, INTEGER
 from solver.jit.fourier import Integer, Real
 from solver.jit.records import Records
 from solver.jit.separate import numbered
 
-_VECTOR, _TABLE, _BLOCKS = (types.Array(types.float64, dimensions, "C") for dimensions in (1, 2, 3))
-_HARMONICS = types.Array(types.int64, 1, "C")
-_SEGMENTS = types.Array(from_dtype(SEGMENT), 1, "C")
+_VECTOR, _TABLE, _BLOCKS = (FLOAT, 1), (FLOAT, 2), (FLOAT, 3)
+_HARMONICS, _SEGMENTS = (INTEGER, 1), (SEGMENT, 1)
 _ARGUMENTS = (
     _TABLE, _HARMONICS, _VECTOR, _HARMONICS, _VECTOR, _VECTOR, _VECTOR, _TABLE, _TABLE, _SEGMENTS, _TABLE,
     _BLOCKS, _TABLE,
 )  # fmt: skip
 
 
-@numbered(_ARGUMENTS, types.UniTuple(types.int64, 2), KERNELS)
+@numbered(_ARGUMENTS, [INTEGER, INTEGER], KERNELS)
 def call_law(
     number: int, U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
     cos_table: Real, sin_table: Real, segments: Records, F: Real, dF_dU: Real, dF_dp: Real,
@@ -77,7 +75,7 @@ _SECOND = (
 )  # fmt: skip
 
 
-@numbered(_SECOND, types.int64, SECOND_KERNELS)
+@numbered(_SECOND, INTEGER, SECOND_KERNELS)
 def call_second(
     number: int, U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, cos_table: Real,
     sin_table: Real, w: Real, dU: Real, drow: Real, dload: Real, out_U: Real, out_row: Real, out_load: Real,

@@ -24,7 +24,6 @@ from functools import cached_property
 from typing import NamedTuple, cast
 
 import numpy as np
-from numba.experimental import structref
 
 from solver.contacts.kernels.stick_slip_events import new_segments
 from solver.jit.decorators import compiled
@@ -170,7 +169,7 @@ class Evaluation(NamedTuple):
 # than the work itself, and minutes of compilation.
 
 
-class _ReceptanceProxy(structref.StructRefProxy):
+class _ReceptanceProxy:
     """A `Receptance` by reference."""
 
     @cached_property
@@ -179,7 +178,7 @@ class _ReceptanceProxy(structref.StructRefProxy):
         return receptance_arrays(cast(Receptance, self))
 
 
-class _EvaluationProxy(structref.StructRefProxy):
+class _EvaluationProxy:
     """An `Evaluation` by reference."""
 
     @cached_property

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -22,6 +21,7 @@ from solver.continuation.extrema.extrema import Survey
 from solver.continuation.extrema.node_table import PointRow
 from solver.continuation.extrema.nodes import NodeSolver, numbers_of
 from solver.continuation.peaks import Peak
+from solver.jit.clock import clock
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import observer_receptance, receptance
 from solver.scene.materials import Haigh
@@ -51,7 +51,7 @@ def observing(
     SceneError
         No such DOF.
     """
-    begun = time.perf_counter()
+    begun = clock()
     workspace = _workspaces(branch, [dof], measure)[0]
     x, measures = _measured([workspace], branch.solutions, branch.tangents, branch.measures)
     seen = replace(branch, balance=workspace.balance, error_estimate=math.nan, newton_iterations=0)
@@ -68,7 +68,7 @@ def observing(
     found = surveyed(seen, survey, limit)
     if errors:
         found = with_error(found, workspace)
-    return replace(found, seconds=time.perf_counter() - begun)
+    return replace(found, seconds=clock() - begun)
 
 
 def highest_peaks(branch: Branch, dofs: Sequence[str]) -> tuple[list[Peak], Branch]:
@@ -92,7 +92,7 @@ def highest_peaks(branch: Branch, dofs: Sequence[str]) -> tuple[list[Peak], Bran
     SceneError
         No such DOF.
     """
-    begun = time.perf_counter()
+    begun = clock()
     workspaces = _workspaces(branch, dofs)
     solver = NodeSolver(workspaces[0])
     nothing = np.zeros((len(branch.values), branch.balance.n_coefficients))
@@ -110,7 +110,7 @@ def highest_peaks(branch: Branch, dofs: Sequence[str]) -> tuple[list[Peak], Bran
     seen = replace(
         branch, balance=workspaces[worst].balance, peaks=peaks, band=None, peak_certificate=certificate,
         error_estimate=math.nan, newton_iterations=branch.newton_iterations + solver.spent,
-        seconds=branch.seconds + time.perf_counter() - begun,
+        seconds=branch.seconds + clock() - begun,
     )  # fmt: skip
     return found, with_error(with_points(seen, points), workspaces[worst])
 

@@ -13,7 +13,6 @@ stick.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -27,6 +26,7 @@ from solver.continuation.extrema.nodes import NodeSolver
 from solver.continuation.segment import Stretch
 from solver.continuation.stretches import ending
 from solver.continuation.walk import walk
+from solver.jit.clock import clock
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
 
@@ -168,7 +168,7 @@ def _stretch(
         measures=_rows([np.array(node.measures) for node in nodes], before.measures),
         status=status, newton_iterations=before.newton_iterations + curve.solver.spent,
         rejected_steps=before.rejected_steps + curve.rejected, stepped_over=before.stepped_over,
-        seconds=time.perf_counter() - begun, walk=np.zeros(0),
+        seconds=clock() - begun, walk=np.zeros(0),
     )  # fmt: skip
 
 

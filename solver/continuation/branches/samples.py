@@ -9,7 +9,6 @@ may stand (`solver.continuation.extrema.extrema`).
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -27,6 +26,7 @@ from solver.continuation.extrema.nodes import NodeSolver
 from solver.continuation.parameter_scale import check_range
 from solver.continuation.segment import joined
 from solver.continuation.settings import ContinuationSettings
+from solver.jit.clock import clock
 from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene
 
@@ -41,7 +41,7 @@ def sampled(
 
     None if it is not unique, nothing damps it, or a frequency has no solution.
     """
-    begun = time.perf_counter()
+    begun = clock()
     balance = build(scene, harmonics=harmonics)
     if not is_unique(balance) or balance.parameter.kind is not Kind.FREQUENCY:
         return None
@@ -68,7 +68,7 @@ def sampled(
         nodes += more
     branch = without_peaks(balance, solver.points_of(nodes), status, start, stop)
     return replace(
-        branch, newton_iterations=solver.spent, seconds=time.perf_counter() - begun,
+        branch, newton_iterations=solver.spent, seconds=clock() - begun,
         flags=branch_flags(workspace, branch.solutions),
     )  # fmt: skip
 

@@ -7,7 +7,6 @@ result is put together.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -38,6 +37,7 @@ from solver.continuation.settings import ContinuationSettings
 from solver.continuation.stretches import BranchStretches, control_of, ending
 from solver.continuation.walk import walk as along
 from solver.errors import SettingError
+from solver.jit.clock import clock
 from solver.jit.fourier import Real, to_full
 from solver.results.notes import ABOVE_FRICTION
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
@@ -121,7 +121,7 @@ def _swept(
     settings: ContinuationSettings, course: Course, on_progress: OnProgress, should_stop: ShouldStop,
 ) -> Branch:  # fmt: skip
     """Return the branch of a balance, as `sweep`."""
-    begun = time.perf_counter()
+    begun = clock()
     first, last = check_range(balance.parameter, start, stop)
     check_limit(limit)
     workspace = Workspace.of(balance)
@@ -163,7 +163,7 @@ def _covering(
 ) -> Iterator[Stretch]:
     """Yield the branch as `walk` does; what cannot be followed is solved by points where it is unique."""
     resume = course.resume
-    begun = time.perf_counter() - (0.0 if resume is None else resume.seconds)
+    begun = clock() - (0.0 if resume is None else resume.seconds)
     balance = workspace.balance
     first, last = balance.parameter.inside(start), balance.parameter.inside(stop)
     unique = is_unique(balance)
@@ -216,7 +216,7 @@ def walk(
     guess : (n_unknowns,) slip motions to start from [m].
     resume : the branch so far, to go on behind its last point; it is the first that is yielded.
     """
-    begun = time.perf_counter() - (0.0 if resume is None else resume.seconds)
+    begun = clock() - (0.0 if resume is None else resume.seconds)
     balance, inside = workspace.balance, workspace.balance.parameter.inside
     control = control_of(settings, inside(start), inside(stop))
     if balance.n_unknowns >= _DEAR:
@@ -244,7 +244,7 @@ def _no_start(balance: Balance, iterations: int, begun: float, status: BranchSta
     """Return the stretch of a branch that could not begin."""
     return Stretch(
         **rows_of(balance, 0), status=status, newton_iterations=iterations, rejected_steps=0, stepped_over=0,
-        seconds=time.perf_counter() - begun, walk=np.zeros(0),
+        seconds=clock() - begun, walk=np.zeros(0),
     )  # fmt: skip
 
 
@@ -269,7 +269,7 @@ def _finish(
     )  # fmt: skip
     branch = surveyed(branch, Survey.of(workspace, whole), limit) if peaks else branch
     flags = branch_flags(workspace, branch.solutions), _drive_flags(workspace, whole, status, start, stop)
-    return replace(branch, flags=flags[0] + flags[1], seconds=time.perf_counter() - begun)
+    return replace(branch, flags=flags[0] + flags[1], seconds=clock() - begun)
 
 
 def without_peaks(

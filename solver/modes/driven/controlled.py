@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, cast
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from solver.balance.speed_line import check_no_line
 from solver.errors import SettingError
+from solver.jit.clock import clock
 from solver.jit.fourier import Real
 from solver.modes.corrector import Corrected
 from solver.modes.curve import FollowedCurve, follow
@@ -60,7 +60,7 @@ def held_amplitude(
         An amplitude, range, DOF or number of harmonics that cannot be; an excitation that is not of harmonic
         1 alone, does not move the DOF, or follows the speed along an engine-order line.
     """
-    begun = time.perf_counter()
+    begun = clock()
     scene = _checked(scene, amplitude, dof)
     low, high = _range(scene, start, stop)
     problem = pose(scene, 1, None, harmonics, kind=Held)

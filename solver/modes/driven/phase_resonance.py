@@ -11,7 +11,6 @@ damping ratio that one mode alone would have.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, cast
@@ -20,6 +19,7 @@ import numpy as np
 
 from solver.balance.speed_line import check_no_line
 from solver.errors import SettingError
+from solver.jit.clock import clock
 from solver.jit.fourier import Complex, Real
 from solver.modes.curve import follow
 from solver.modes.equations import Evaluated, Forced
@@ -74,7 +74,7 @@ def phase_resonance(
         As `nonlinear_mode`; or an excitation that does not drive the mode, has harmonics beyond the first,
         or follows the speed along an engine-order line.
     """
-    begun = time.perf_counter()
+    begun = clock()
     low, high = (math.log(each) for each in check_amplitudes(amplitudes))
     check_no_line(scene)
     problem = pose(scene, mode, nodal_diameter, harmonics, kind=Driven)

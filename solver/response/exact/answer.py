@@ -7,13 +7,13 @@ extremes are zeros of the series of the velocity.
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 
 from solver.errors import SettingError
+from solver.jit.clock import clock
 from solver.jit.fourier import Real
 from solver.response.contact_response import ContactResponse, ContactState, flags_of
 from solver.response.exact.beside import orbit_beside
@@ -106,12 +106,12 @@ def solve_beside(
     scene: Scene, frequency_hz: float, harmonics: int, near: Orbit | Solution | None = None
 ) -> tuple[Solution, Orbit | None]:
     """Return the response and its orbit, looked for beside `near`, else from rest; errors as `Piecewise`."""
-    begun = time.perf_counter()
+    begun = clock()
     scene = scene.at_frequency(frequency_hz)
     system, orbit = _orbit_of(scene, frequency_hz, near)
     highest = max(harmonics, system.top)
     if isinstance(orbit, SolutionStatus):
-        seconds = time.perf_counter() - begun
+        seconds = clock() - begun
         nothing = Solution.without_numbers(
             scene=scene, frequency_hz=frequency_hz, n_harmonics=harmonics, status=orbit, highest=highest,
             seconds=seconds,
@@ -124,7 +124,7 @@ def solve_beside(
 
 def stability_exactly(scene: Scene, frequency_hz: float) -> Stability:
     """Return the multipliers with rigid contacts; errors as `Piecewise`, or where there is no response."""
-    begun = time.perf_counter()
+    begun = clock()
     _, orbit = _orbit_of(scene, frequency_hz)
     if isinstance(orbit, SolutionStatus):
         raise SettingError("solution", orbit.value, "must have converged")
@@ -169,7 +169,7 @@ def _described(
         mean=float(observed[0]), harmonics=np.concatenate([[abs(observed[0])], amplitudes]),
         observed=observed, contacts=contacts, flags=_flags(system, orbit, contacts),
         residual=orbit.residual, error_estimate=gain * orbit.error + ROUNDING * largest,
-        newton_iterations=orbit.steps, seconds=time.perf_counter() - begun,
+        newton_iterations=orbit.steps, seconds=clock() - begun,
     )  # fmt: skip
 
 
@@ -268,5 +268,5 @@ def _stability(orbit: Orbit, frequency_hz: float, begun: float) -> Stability:
     multipliers = others[np.argsort(-np.abs(others), kind="stable")].astype(np.complex128)
     return Stability(
         multipliers=multipliers, neutral=neutral, growth=growth_of(multipliers), frequency_hz=frequency_hz,
-        seconds=time.perf_counter() - begun,
+        seconds=clock() - begun,
     )  # fmt: skip

@@ -8,7 +8,6 @@ poles of these two modes, and beside them, so that narrow ones are not stepped o
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any
@@ -28,6 +27,7 @@ from solver.continuation.segment import Course
 from solver.continuation.settings import ContinuationSettings
 from solver.continuation.walk import Curve, walk
 from solver.errors import SettingError
+from solver.jit.clock import clock
 from solver.response.contact_response import code_of
 from solver.response.exact.branch import ExactBranch, Orbits, Point
 from solver.response.exact.piecewise import FREE, STICK, MemberState, Piecewise
@@ -72,7 +72,7 @@ def sweep_exactly(
         A bad path, range, frequency, limit or number of harmonics; a guess or a beginning of a branch; a part
         of the scene that cannot stand beside rigid contacts.
     """
-    begun = time.perf_counter()
+    begun = clock()
     unknown = others.keys() - {"accuracy", "effects"}
     if unknown:
         raise TypeError(f"sweep takes no {', '.join(sorted(unknown))}")
@@ -252,7 +252,7 @@ def _finished(walk: OrbitWalk, limit: float | None, begun: float) -> ExactBranch
         peaks=peaks, band=None if at is None else _band(orbits, points, at),
         error_estimate=math.nan if highest is None else highest.error_estimate,
         newton_iterations=sum(each.newton_iterations for each in solutions),
-        rejected_steps=walk.rejected, seconds=time.perf_counter() - begun,
+        rejected_steps=walk.rejected, seconds=clock() - begun,
         peak_certificate=uncertain(_NOT_PROVEN, gap),
         flags=tuple(flag for flag in (MEAN_UNDETERMINED, HISTORY_DEPENDENT) if flag in every),
         solutions=solutions, highest=highest, beyond=walk.beyond,

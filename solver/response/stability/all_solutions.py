@@ -7,7 +7,6 @@ complete only where the response is proven to be the only one.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar
@@ -18,6 +17,7 @@ from solver.balance.balance import build
 from solver.balance.simplifications import Effects
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.errors import SettingError, check_count
+from solver.jit.clock import clock
 from solver.response.solution import Solution
 from solver.response.solve import describe
 from solver.response.stability import MOST_STARTS
@@ -133,7 +133,7 @@ def solve_all(
     SettingError
         A bad frequency, number of harmonics, of starts or seed.
     """
-    begun = time.perf_counter()
+    begun = clock()
     check_frequency("frequency_hz", frequency_hz)
     check_count("starts", starts, 0, MOST_STARTS)
     check_count("seed", seed, 0, 2**63 - 1)
@@ -151,7 +151,7 @@ def solve_all(
     ordered = sorted(found, key=lambda each: -each.solution.half_peak_to_peak)
     return AllSolutions(
         solutions=tuple(ordered), uniqueness=only, starts=0 if only.proven else search.starts,
-        stopped=stopped, seconds=time.perf_counter() - begun,
+        stopped=stopped, seconds=clock() - begun,
     )  # fmt: skip
 
 
@@ -159,7 +159,7 @@ def _described(search: SolutionSearch, frequency_hz: float) -> list[FoundSolutio
     """Return what is known as solutions."""
     found = []
     for each in search.known:
-        solution = describe(search.workspace, each.point, frequency_hz, time.perf_counter())
+        solution = describe(search.workspace, each.point, frequency_hz, clock())
         if not solution.converged:
             continue
         stable: Stability | None = None

@@ -9,7 +9,6 @@ goes over to twice its period, or a second frequency grows, Floquet multipliers 
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -28,6 +27,7 @@ from solver.continuation.extrema.node_table import PointRow
 from solver.continuation.extrema.nodes import NodeSolver
 from solver.continuation.folds import fold_between
 from solver.continuation.marks import Bifurcations, Mark, MarkKind
+from solver.jit.clock import clock
 from solver.jit.fourier import Real
 from solver.response.stability.floquet import branch_stability
 from solver.response.stability.multipliers import Growth
@@ -55,7 +55,7 @@ def bifurcations(branch: AnyBranch, *, multipliers: bool = False) -> Bifurcation
     SettingError
         With `multipliers`: a law that does not say how it is perturbed.
     """
-    begun = time.perf_counter()
+    begun = clock()
     if not isinstance(branch, Branch):
         return branch.bifurcations  # exact orbits come with their multipliers
     count, unique, marks = len(branch.values), is_unique(branch.balance), tuple[Mark, ...]()
@@ -70,7 +70,7 @@ def bifurcations(branch: AnyBranch, *, multipliers: bool = False) -> Bifurcation
         marks = (*marks, *_end(branch, along))
     return Bifurcations(
         unstable=unstable, marks=marks, known_by=known_by, parameter=branch.parameter,
-        seconds=time.perf_counter() - begun,
+        seconds=clock() - begun,
     )  # fmt: skip
 
 

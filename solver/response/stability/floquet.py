@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -11,6 +10,7 @@ from solver.contacts.pieces.piece import ContactPart
 from solver.continuation.branch import Branch
 from solver.errors import SettingError
 from solver.jit import fourier
+from solver.jit.clock import clock
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_counts
@@ -105,13 +105,13 @@ def motions_stability(
     should_stop: ShouldStop = None,
 ) -> Stability:  # fmt: skip
     """Return the stability of a response of a scene at a frequency with given motions of its contacts."""
-    begun = time.perf_counter()
+    begun = clock()
     found = scene_monodromy(scene, frequency_hz, motions, on_progress=on_progress, should_stop=should_stop)
     values = np.linalg.eigvals(found.reduced).astype(np.complex128)
     multipliers = values[np.argsort(-np.abs(values), kind="stable")]
     return Stability(
         multipliers=multipliers, neutral=found.neutral, growth=growth_of(multipliers),
-        frequency_hz=frequency_hz, seconds=time.perf_counter() - begun,
+        frequency_hz=frequency_hz, seconds=clock() - begun,
     )  # fmt: skip
 
 

@@ -7,7 +7,6 @@ the worst patterns of both limits are where the climb with exact gradients of th
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,6 +16,7 @@ import numpy as np
 
 from solver.arrays import Real
 from solver.errors import SettingError
+from solver.jit.clock import clock
 from solver.response.band_end import of_frequency
 from solver.results.notes import notes_of_all
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
@@ -96,7 +96,7 @@ def worst_mistuning(
         The scene is not cyclic, a part or DOF it does not have, bounds that let a factor become 0, forces of
         several harmonics or a base that moves in a linear limit.
     """
-    begun = time.perf_counter()
+    begun = clock()
     names, how = (of,) if isinstance(of, str) else tuple(of), _contacts(scene, contacts)
     blades = check_bounds(scene, within, rms, intentional)
     dof = scene.observe.dof.partition("@")[0] if dof is None else dof
@@ -126,7 +126,7 @@ def worst_mistuning(
         contacts=how.value, whitehead=whitehead(len(blades)), starts=search.starts,
         climbs=search.climbs if how in _SOLVED else 0, n_harmonics=harmonics, **found,
         notes=notes_of_all(of_frequency(searched.scene, at, band) for at in places),
-        seconds=time.perf_counter() - begun,
+        seconds=clock() - begun,
     )  # fmt: skip
 
 

@@ -8,7 +8,6 @@ optimum from above: where a line is higher than that it only has to show that it
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -18,6 +17,7 @@ from solver.balance.simplifications import Effects
 from solver.continuation.branch import BranchStatus
 from solver.errors import SettingError, check_count
 from solver.first_use import renamed
+from solver.jit.clock import clock
 from solver.results.watch import shows_progress
 from solver.scene.scene import Scene
 from solver.studies.peaks.envelope_minimum import DOUBT, Lowest, flat, minima, rows_at
@@ -91,7 +91,7 @@ def least_peak(
     SettingError
         A bad path, range or number of harmonics or basins, or a first sweep outside the range.
     """
-    begun = time.perf_counter()
+    begun = clock()
     check_count("basins", basins, 1)
     pace = replace(_PACE, above=WIDE) if thorough and basins > 1 else _PACE
     allowance = Allowance(should_stop, RESPONSES * (THOROUGHLY if thorough else 1.0))

@@ -8,7 +8,6 @@ resonance band; and where that does not change either, the least value of the pa
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Annotated
@@ -19,6 +18,7 @@ from solver.continuation.between import least_between, level_up_to
 from solver.continuation.branch import Branch
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, Z
 from solver.continuation.peaks import Peak
+from solver.jit.clock import clock
 from solver.studies.peaks.envelope_minimum import Lowest, rows_at
 from solver.studies.peaks.results import ChosenBy, LeastPeak
 from solver.studies.peaks.track import Look
@@ -180,7 +180,7 @@ def _least_next(tracker: Tracker, looks: list[Look], constant: list[Peak], prove
     free = _free(inner)
     if free is not None:
         return min(max(tracker.scale.inside(inner.scale.outside(free)), looks[0].z), looks[-1].z)
-    best = prove(inner, time.perf_counter())
+    best = prove(inner, clock())
     at = best.at if np.isfinite(best.at) else low
     return min(max(tracker.scale.inside(at), looks[0].z), looks[-1].z)
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, OMEGA, Z
+from solver.jit.clock import clock
 from solver.jit.fourier import Real
 from solver.studies.peaks.envelope_minimum import Lowest, flat, rows_at
 from solver.studies.peaks.results import ActivePeak, Basin, ChosenBy, LeastPeak, TrackStatus
@@ -52,7 +52,7 @@ def result_of(
     if not found:
         return LeastPeak(
             status=status, at=math.nan, peak=math.nan, active=(), basins=(), branch=None,
-            sweeps=tracker.sweeps, work=_work(tracker, None), seconds=time.perf_counter() - begun,
+            sweeps=tracker.sweeps, work=_work(tracker, None), seconds=clock() - begun,
         )  # fmt: skip
     if status in _AS_SEEN:
         found = _with_best_seen(tracker, found)
@@ -66,7 +66,7 @@ def result_of(
     return LeastPeak(
         status=status, at=tracker.scale.outside(best.z), peak=best.height, active=active,
         basins=tuple(_basin(tracker, one) for one in found), branch=None if look is None else look.branch,
-        sweeps=tracker.sweeps, work=_work(tracker, look), seconds=time.perf_counter() - begun,
+        sweeps=tracker.sweeps, work=_work(tracker, look), seconds=clock() - begun,
         plateau=None if ends is None else (tracker.scale.outside(ends[0]), tracker.scale.outside(ends[1])),
         chosen_by=(ChosenBy.HIGHEST_PEAK if plateau is None else plateau.by).value,
     )  # fmt: skip

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import time
 from collections.abc import Callable
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from solver.balance.simplifications import Effects
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, OMEGA, Z
 from solver.errors import check_count
+from solver.jit.clock import clock
 from solver.jit.fourier import Real
 from solver.results.watch import shows_progress
 from solver.scene.scene import Scene
@@ -65,7 +65,7 @@ def track_peak(
     SettingError
         A bad path, range, number of harmonics or of checks.
     """
-    begun = time.perf_counter()
+    begun = clock()
     check_count("checks", checks, 0)
     allowance = Allowance(should_stop, RESPONSES * (THOROUGHLY + checks / 20.0))
     tracker = Tracker(scene, parameter, start, stop, harmonics, effects, allowance=allowance)
@@ -134,7 +134,7 @@ def _result(tracker: Tracker, best: LeastPeak, status: TrackStatus, forward: boo
         competing=tuple(_competing(tracker, line, forward) for line in tracker.lines), exchanges=exchanges,
         branches=tuple(look.branch for look in tracker.looks), n_harmonics=balance.n_harmonics,
         sweeps=tracker.sweeps, status=status,
-        seconds=time.perf_counter() - begun, given=balance.scene,
+        seconds=clock() - begun, given=balance.scene,
     )  # fmt: skip
 
 

@@ -7,9 +7,9 @@ always ends at the same place, however fast the machine is.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 
+from solver.jit.clock import clock
 from solver.studies.peaks.results import TrackStatus
 
 RESPONSES = 100.0  # frequency responses whose work may be spent
@@ -38,7 +38,7 @@ class Allowance:
 
     def __init__(self, should_stop: Callable[[], bool] | None, responses: float = RESPONSES) -> None:
         self._should_stop, self._responses = should_stop, responses
-        self._asked = time.perf_counter()
+        self._asked = clock()
         self._ended = math.inf
         self._status: TrackStatus | None = None
         self._unit = math.inf
@@ -60,12 +60,12 @@ class Allowance:
 
     def ask(self) -> bool:
         """Return whether the caller wants it to end."""
-        self._asked = time.perf_counter()
+        self._asked = clock()
         return self._should_stop is not None and self._should_stop()
 
     def due(self) -> bool:
         """Return whether the caller wants it to end, asking now and then only."""
-        return time.perf_counter() - self._asked >= _EVERY and self.ask()
+        return clock() - self._asked >= _EVERY and self.ask()
 
     def check(self, spent: float) -> None:
         """Raise HaltedError if the end has come; `spent`: Newton iterations so far."""
@@ -79,7 +79,7 @@ class Allowance:
     def end(self, status: TrackStatus) -> None:
         """Say that the end has come: what was found may still be read, for a moment."""
         if self._status is None:
-            self._status, self._ended = status, time.perf_counter()
+            self._status, self._ended = status, clock()
 
     @property
     def ended(self) -> bool:
@@ -89,4 +89,4 @@ class Allowance:
     @property
     def over(self) -> bool:
         """Whether what was found may not even be read any more, as far as that takes solving."""
-        return time.perf_counter() - self._ended > AFTERWARDS
+        return clock() - self._ended > AFTERWARDS

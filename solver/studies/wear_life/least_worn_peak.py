@@ -9,7 +9,6 @@ derivative; where two of them are as high is a corner, in which their tangents m
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -20,6 +19,7 @@ import numpy as np
 from solver.arrays import FloatOrNaN, Real
 from solver.continuation.parameter_scale import scale_of
 from solver.errors import SettingError, check_count
+from solver.jit.clock import clock
 from solver.results.base import Shown
 from solver.results.views import Data, Views
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
@@ -105,7 +105,7 @@ def least_worn_peak(
     SettingError
         As `wear_life`; a range, factors or looks that are none.
     """
-    begun = time.perf_counter()
+    begun = clock()
     low, high = checked_factors(factors)
     since, longest = checked_since(from_hours, mission.hours), replace(mission, hours=mission.hours * high)
     check_count("looks", looks, FEWEST_LOOKS, 1000)
@@ -133,7 +133,7 @@ def least_worn_peak(
         at=scale.outside(best.z) if known else math.nan, worst=best.value if known else math.nan,
         worst_hours=best.hours, first=best.first,
         looked_at=np.array([scale.outside(one.z) for one in search.looked]),
-        heights=np.array([one.value for one in search.looked]), seconds=time.perf_counter() - begun,
+        heights=np.array([one.value for one in search.looked]), seconds=clock() - begun,
     )  # fmt: skip
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -14,6 +13,7 @@ from solver.balance.balance import check_harmonics
 from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.continuation.branches.sweep import sweep
 from solver.errors import SettingError, check_count
+from solver.jit.clock import clock
 from solver.response.known import known_of_solution
 from solver.response.solve import solve
 from solver.results.known import NOTHING_KNOWN, Known
@@ -73,7 +73,7 @@ def wear_life(
         says what a depth takes away, rigid contacts; at a peak a law without second derivatives or an
         engine-order line.
     """
-    begun = time.perf_counter()
+    begun = clock()
     course = course_of(
         scene, mission, wear, paths=paths, tolerance=tolerance, harmonics=harmonics, should_stop=should_stop
     )
@@ -162,7 +162,7 @@ def _result(course: WearCourse, scene: Scene, limit: float | None, points: int, 
         limit_slopes=met.instant_moves if met is not None and met.hours > 0.0 and known else nothing,
         depth_slopes=last.slopes if last is not None and known else np.outer(np.ones(course.n), nothing),
         at_peak=course.conditions.blocks is None, n_harmonics=course.conditions.harmonics,
-        steps=len(stretches), responses=course.conditions.solved, seconds=time.perf_counter() - begun,
+        steps=len(stretches), responses=course.conditions.solved, seconds=clock() - begun,
         begin_known=ends[0], end_known=ends[1],
     )  # fmt: skip
 

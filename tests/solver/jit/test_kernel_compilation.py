@@ -13,7 +13,6 @@ KERNELS = """
 from __future__ import annotations
 import numpy as np
 from solver.jit.separate import apart
-from numba import types
 from solver.jit.decorators import compiled
 from solver.jit.separate import numbered
 
@@ -56,7 +55,7 @@ def broken(x: float) -> float:
 def sometimes(x: float) -> float:
     return broken(x) if x > 1e9 else x
 
-@numbered((types.float64,), types.float64, known=("little:half", "little:broken"))
+@numbered((np.float64,), np.float64, known=("little:half", "little:broken"))
 def by_number(number: int, x: float) -> float:
     ...
 

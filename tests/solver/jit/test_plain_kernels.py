@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).parent.parent.parent.parent
-PLAIN = {**os.environ, "STICKSLIP_PLAIN_KERNELS": "1"}
+PLAIN = {**os.environ, "STICKSLIP_KERNELS": "plain"}
 # What asks of Numba and LLVM what they do not document.
 PRIVATE = "('solver.jit.cache', 'solver.jit.slots', 'solver.jit.tables')"
 NUMBERS = f"""
@@ -56,7 +56,7 @@ def test_the_tests_of_the_contact_force_pass() -> None:
 @pytest.mark.parametrize("law", ["polynomial", "coulomb-box"])
 def test_a_law_called_by_its_number_is_the_same_and_asks_for_nothing_private(law: str) -> None:
     plain, none = numbers(law, PLAIN)
-    usual, some = numbers(law, {**os.environ, "STICKSLIP_PLAIN_KERNELS": "0"})
+    usual, some = numbers(law, {**os.environ, "STICKSLIP_KERNELS": "compiled"})
     assert none == []
     assert len(some) == 3
     for one, other in zip(plain, usual, strict=True):

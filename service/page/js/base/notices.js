@@ -17,6 +17,12 @@ export function startNotices() {
   on("online", () => {
     banner.hidden = true;
   });
+  // While the service starts the banner says what; what goes on then is not for it to hide.
+  on("starting", (text) => {
+    clearTimeout(fading);
+    show(banner, text ?? "");
+    banner.hidden = !text;
+  });
   on("notice", (text) => {
     clearTimeout(fading);
     show(banner, text, " ", el("button", { type: "button", onclick: () => { banner.hidden = true; } }, "Close"));

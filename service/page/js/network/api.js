@@ -98,11 +98,23 @@ export function lost() {
   return back;
 }
 
+const health = () => fetch("/health/ready", { cache: "no-store" });
+
 async function alive() {
   try {
-    return (await fetch("/health/ready", { cache: "no-store" })).ok;
+    return (await health()).ok;
   } catch {
     return false;
+  }
+}
+
+// Tells what the service still starts, in its own words, until all is there.
+export async function watchStart() {
+  for (let told = null; ; await pause(2)) {
+    const { starting = null } = await health().then((answer) => answer.json(), () => ({ starting: told }));
+    if (starting !== told) tell("starting", starting);
+    if (!starting) return;
+    told = starting;
   }
 }
 

@@ -1,7 +1,8 @@
 """The functions of a law made ready to be called by kernels: compiled, or called as Python.
 
 Numba compiles a plain function as it compiles a kernel, and keeps the machine code; one that is compiled by
-its author (`numba.njit`) is taken as it is. What Numba cannot compile is called as Python, slow but right.
+its author (`numba.njit`) is taken as it is. What Numba cannot compile is called as Python, slow but right;
+where kernels are interpreted, all are.
 """
 
 from __future__ import annotations
@@ -13,16 +14,20 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
 
-import numba
 import numpy as np
-from numba.core.errors import NumbaError
 
 from solver.contacts.kernels.columns import MOST_OWN
 from solver.contacts.kernels.history.partials import BY_COMPLEX_STEP, BY_DIFFERENCES, BY_HAND
 from solver.contacts.laws.history.definition import Derivatives, HistoryLaw
 from solver.errors import SettingError
 from solver.jit.decorators import kept
+from solver.jit.forms import of_numba
 from solver.jit.law_functions import FORMS, TABLES
+from solver.jit.way import WAY, Way
+
+if WAY is not Way.INTERPRETED:
+    import numba
+    from numba.core.errors import NumbaError
 
 WAYS = {
     Derivatives.BY_HAND: BY_HAND, Derivatives.COMPLEX_STEP: BY_COMPLEX_STEP,
@@ -92,6 +97,8 @@ def ready(law: HistoryLaw) -> Ready:
 
 def _made(place: str, function: Callable[..., Any]) -> tuple[Any, bool]:
     """Return a function compiled for its contract, and whether Numba compiled it and not only its call."""
+    if WAY is Way.INTERPRETED:
+        return _interpreted(place, getattr(function, "py_func", function)), True
     try:
         return _compiled(place, function), True
     except NumbaError:
@@ -102,17 +109,37 @@ def _made(place: str, function: Callable[..., Any]) -> tuple[Any, bool]:
 
 def _compiled(place: str, function: Callable[..., Any]) -> Any:
     arguments, result = FORMS[place]
+    wanted = tuple(of_numba(one) for one in arguments)
     kernel: Any = function
     if not hasattr(function, "py_func"):
         kernel = numba.njit(nogil=True, error_model="numpy")(function)
         if Path(function.__code__.co_filename).is_file():
             kept(kernel, function)
-    kernel.compile(arguments)
-    found = next(one.return_type for one in kernel.nopython_signatures if one.args == arguments)
-    if found != result:
-        wanted = "must return a float on every way" if result != numba.types.none else "must return nothing"
-        raise SettingError(place.removeprefix("complex_"), str(found), wanted)
+    kernel.compile(wanted)
+    found = next(one.return_type for one in kernel.nopython_signatures if one.args == wanted)
+    if found != of_numba(result):
+        raise _wrong(place, str(found))
     return kernel
+
+
+def _wrong(place: str, found: str) -> SettingError:
+    wanted = "must return a float on every way" if FORMS[place][1] is not None else "must return nothing"
+    return SettingError(place.removeprefix("complex_"), found, wanted)
+
+
+def _interpreted(place: str, function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that is called as Python, tried once."""
+    arguments, result = FORMS[place]
+    with np.errstate(all="ignore"):
+        found = function(*(_example(one) for one in arguments))
+    if isinstance(found, np.generic | float) is (result is None):
+        raise _wrong(place, type(found).__name__)
+    return function
+
+
+def _example(form: Any) -> Any:
+    number, *dimensions = form if isinstance(form, tuple) else (form,)
+    return np.full([MOST_OWN] * dimensions[0], 0.5, number) if dimensions else number(0.5)
 
 
 def _as_python(place: str, function: Callable[..., Any]) -> Callable[..., Any]:
@@ -150,12 +177,14 @@ def _as_python(place: str, function: Callable[..., Any]) -> Callable[..., Any]:
 
 def _complex_kernels(law: HistoryLaw) -> dict[str, Any] | None:
     """Return the functions compiled for complex numbers, None if they do not take them."""
+    functions = {f"complex_{at}": one for at, one in law.functions.items() if not at.endswith("slopes")}
+    if WAY is Way.INTERPRETED:
+        try:
+            return {place: _made(place, function)[0] for place, function in functions.items()}
+        except (TypeError, ValueError, SettingError):
+            return None
     try:
-        return {
-            f"complex_{place}": _compiled(f"complex_{place}", function)
-            for place, function in law.functions.items()
-            if not place.endswith("slopes")
-        }
+        return {place: _compiled(place, function) for place, function in functions.items()}
     except (NumbaError, NotImplementedError, SettingError):  # the second: what it types and cannot lower
         return None
 
