@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from solver.jit.folder import folder
-from solver.jit.shipped import take
+from solver.jit.shipped import processor, take
 
 try:
     import fcntl
@@ -52,10 +52,8 @@ class Stage(StrEnum):
 
 def _processor() -> str:
     """Return a name for this kind of processor: machine code is for one."""
-    told = platform.machine() + platform.processor()
-    with contextlib.suppress(OSError):
-        lines = Path("/proc/cpuinfo").read_text("utf-8").split("\n\n")[0].splitlines()
-        told += "".join(line for line in lines if line.startswith(("model name", "flags", "Features")))
+    lines = [line for line in processor() if line.startswith(("model name", "flags", "Features"))]
+    told = "".join((platform.machine(), platform.processor(), *lines))
     return f"{zlib.crc32(told.encode()):08x}"
 
 

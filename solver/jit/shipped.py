@@ -39,14 +39,18 @@ _TARGETS = {
 }
 
 
+def processor() -> list[str]:
+    """Return what Linux tells of the first processor, line by line; nothing elsewhere."""
+    try:
+        return Path("/proc/cpuinfo").read_text("utf-8").partition("\n\n")[0].splitlines()
+    except OSError:
+        return []
+
+
 def target() -> Target | None:
     """Return the kind of this processor; None if it is none, or has not what it needs."""
     kind = _TARGETS.get(platform.machine())
-    try:
-        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
-    except OSError:  # no Linux: what it has is not known
-        return None
-    found = next((line for line in lines if line.startswith(("flags", "Features"))), "")
+    found = next((line for line in processor() if line.startswith(("flags", "Features"))), "")
     return kind if kind is not None and kind.needs <= set(found.partition(":")[2].split()) else None
 
 
