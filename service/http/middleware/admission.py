@@ -5,6 +5,7 @@ It lets through what is listed here and refuses the rest: a new route needs a ke
 
 from __future__ import annotations
 
+import asyncio
 import re
 import time
 from collections.abc import Iterator
@@ -19,7 +20,7 @@ from service.auth import callers
 from service.auth.allowances import AtATime, share
 from service.auth.authenticator import REMEMBERED_SECONDS, Authenticator, id_of
 from service.auth.callers import LINK_READERS, Caller
-from service.errors import OriginRefusedError, ServiceError
+from service.errors import OriginRefusedError, RetryLaterError, ServiceError
 from service.http.middleware.connections import KEY, Connection
 from service.queue.lanes import Lane
 from service.schemas.problems import AWAY, answered
@@ -90,6 +91,8 @@ _COMPUTED = re.compile(r"/v1/jobs/[^/]+/report/?")
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 _OURS = frozenset({"same-origin", "none"})
 _BEARER = "bearer "
+_REFUSED_SECONDS = 0.25
+"""Before who is to come later hears of it: a loop that asks again at once would keep the event loop busy."""
 
 
 def scope_of(method: str, path: str) -> callers.Scope | None:
@@ -142,6 +145,8 @@ class Admission:
                 if needed is not None:
                     self._authenticator.require(caller, needed)
             except (ServiceError, *AWAY) as error:
+                if isinstance(error, RetryLaterError):
+                    await asyncio.sleep(_REFUSED_SECONDS)
                 await answered(request, error)(scope, receive, send)
                 return
             request.state.caller = caller
