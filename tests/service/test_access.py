@@ -133,6 +133,7 @@ def test_limits_of_a_key(guarded: ServedClient) -> None:
     refused = guarded.get("/v1/jobs", headers=few)
     assert "3 requests a minute" in is_problem(refused, 429)["detail"]
     assert 1 <= int(refused.headers["retry-after"]) <= 20
+    assert refused.elapsed >= timedelta(seconds=0.2), "a loop that asks again at once waits first"
     monitor = bearer(token_of(guarded, Scope.MONITOR))
     told = guarded.get("/metrics", headers=monitor).text
     assert re.search(r'\nstickslip_refused_total\{owner="[^"]+",status="429"\} [1-9]', told)
