@@ -65,6 +65,7 @@ CASES = {
     "rig-coverage": "rigs:rig_coverage",
     "worst-mistuning": "mistuned:worst_patterns",
     "certificates": "certificates:certificates",
+    "compiling": "compiling:compiling",
 }
 """The function of each case, in a module of this package."""
 
