@@ -184,7 +184,8 @@ def test_a_job_of_another_service_is_followed_by_its_row(cluster: Cluster) -> No
 
             names = asyncio.run(told())
             assert set(names[:-1]) == {"progress"}
-            assert len(names) > 3 and names[-1] == "end"
+            assert len(names) > 3
+            assert names[-1] == "end"
         finally:
             other.stop()
             here.database.close()
