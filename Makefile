@@ -5,9 +5,8 @@ BIN := .venv/bin
 # Python writes the bytecode of what is imported, most of it while the kernels are compiled: pip would compile
 # fifteen thousand modules, of which two thousand are ever imported.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
-# The packages of parts of constraints.txt, of files whose digests stand there alone.
-PINNED = awk -v parts=" $(1) " '/^\# / {on = index(parts, " " $$2 " ")} on' constraints.txt \
-	  | $(PIP) --require-hashes -r /dev/stdin
+# The packages of some parts, of files whose digests stand there alone.
+PINNED = $(PIP) --require-hashes $(1:%=-r requirements/%.txt)
 PACKAGES := .venv/.packages
 STAMP := .venv/.up-to-date
 DEV := .venv/.for-development
@@ -34,25 +33,24 @@ help:
 	@echo "make lint       check the code: ruff, mypy, import-linter"
 	@echo "make bench      measure the solver and print tables; some of them: make bench BENCH='case-a chains'"
 	@echo "make docs       build the documentation site, reference and gallery too; it goes to site/"
-	@echo "make pins       renew the digests in constraints.txt, after a version there was changed"
+	@echo "make pins       renew the digests in requirements/, after a version there was changed"
 	@echo "make sbom       list what an installation consists of, as CycloneDX, in sbom.cdx.json"
 	@echo "make serve      start the service on http://127.0.0.1:8000"
 	@echo "make clean      remove .venv, caches and demo-output/"
 
 setup: $(STAMP)
 
-# The first kernels are compiled while the other packages are installed: pip keeps one core busy, no more.
-# What is imported meanwhile is kept as bytecode, whatever PYTHONDONTWRITEBYTECODE says: else every process
-# takes a second longer to start.
-$(PACKAGES): pyproject.toml constraints.txt
+# The first kernels are compiled beside, from when they can be, and nobody waits for them here: what fails of it
+# fails again, and is told, where they are needed. What is imported meanwhile is kept as bytecode, whatever
+# PYTHONDONTWRITEBYTECODE says: else every process takes a second longer to start.
+$(PACKAGES): pyproject.toml $(wildcard requirements/*.txt)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 	  echo "stickslip needs Python 3.11 or newer, as in: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1; }
 	$(PYTHON) -m venv .venv
 	$(call PINNED,kernels)
-	@echo "Installing the other packages, and compiling the kernels of a first design: half a minute on two cores."
-	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m service.warm_up --first & kernels=$$!; \
-	  $(call PINNED,package) || { kill $$kernels; exit 1; }; \
-	  wait $$kernels
+	@echo "Installing the other packages; the kernels of a first design are compiled beside."
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m service.warm_up --first </dev/null >/dev/null 2>&1 & kernels=$$!; \
+	  $(call PINNED,package) || { kill $$kernels; exit 1; }
 	$(PIP) --no-deps --no-build-isolation -e .
 	@touch $@
 
@@ -69,7 +67,7 @@ $(DEV): $(PACKAGES)
 	  wait $$kernels
 	@touch $(STAMP) $@
 
-# The set-up is completed after it: the first optimum does not wait for what other scenes need.
+# Its first optimum waits for no compiler; the set-up is completed after it.
 demo: $(PACKAGES)
 	PYTHONDONTWRITEBYTECODE= $(BIN)/stickslip demo
 	@$(MAKE) --no-print-directory setup
@@ -110,12 +108,10 @@ docs: dev
 
 # Of all files of a version, for any system and any Python: which one is installed is another machine's affair.
 pins: dev
-	for part in kernels package image dev; do \
-	  echo "# $$part"; \
-	  awk -v part=$$part '/^# / {on = $$2 == part} on' constraints.txt | $(BIN)/uv pip compile - --generate-hashes \
-	    --no-deps --universal --python-version 3.12 --no-header --no-annotate --quiet || exit 1; \
-	done > .venv/pins
-	mv .venv/pins constraints.txt
+	for file in requirements/*.txt; do \
+	  $(BIN)/uv pip compile $$file --output-file .venv/pins --generate-hashes --no-deps --universal \
+	    --python-version 3.12 --no-header --no-annotate --quiet && mv .venv/pins $$file || exit 1; \
+	done
 
 sbom: setup
 	$(BIN)/python deploy/sbom.py > sbom.cdx.json

@@ -63,5 +63,5 @@ def _compiled() -> Path:
             "NUMBA_CACHE_DIR": cache, shipped.CPU_NAME: kind.name, shipped.CPU_FEATURES: kind.features,
             "STICKSLIP_KERNELS": "compiled",
         }  # fmt: skip
-        subprocess.run([sys.executable, "-m", "service.warm_up"], cwd=_HERE, check=True)
+        subprocess.run([sys.executable, "-m", "service.warm_up", "--scenes"], cwd=_HERE, check=True)
         return shipped.pack()

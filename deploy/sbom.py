@@ -1,6 +1,6 @@
 """What an installation consists of, as CycloneDX 1.6 on standard output: ``make sbom``.
 
-The packages of ``constraints.txt`` but those of development, with the digests of their files, their licences
+The packages of ``requirements/`` but those of development, with the digests of their files, their licences
 and what needs what as far as they are installed here, and the scripts of others that the page brings along.
 """
 
@@ -23,7 +23,8 @@ _BUILDS_ONLY = "esbuild"
 
 def packages() -> Iterator[dict[str, Any]]:
     """Yield the packages of Python."""
-    running, _, _ = (ROOT / "constraints.txt").read_text("utf-8").partition("\n# dev\n")
+    files = sorted((ROOT / "requirements").glob("*.txt"))
+    running = "".join(file.read_text("utf-8") for file in files if file.stem != "dev")
     for name, version, hashes in _PIN.findall(running):
         about = _component(_normal(name), version, "pypi")
         digests = re.findall(r"sha256:(\w+)", hashes)

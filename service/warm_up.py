@@ -3,7 +3,8 @@
 Part of ``make setup`` and ``make test``. All cores compile at once; the machine code is cached on disk and
 serves every process from then on. With ``--first`` only what a response and a design of a scene like the
 paper's call is compiled, in half the time: ``make demo`` does the rest after its first optimum. Who
-finds nothing compiled has it done by ``--beside``: both, one after the other, if nobody else is at it.
+finds nothing compiled has it done by ``--beside``: both, one after the other, if nobody else is at it. A
+wheel that brings its kernels has those of every shipped scene too (``--scenes``).
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import argparse
 import os
 
+import optim
 import solver
 from service.jobs.kinds import warm_up
 from solver.contacts.laws.registry import laws
@@ -30,12 +32,23 @@ def functions_of_laws() -> None:
         law.prepare()
 
 
+def shipped_scenes() -> None:
+    """Solve each shipped scene; sweep those whose contacts are not the faces of a damper; design a disk's."""
+    for name in solver.shipped_scenes():
+        scene = solver.load_scene(name)
+        solver.solve(scene, frequency_hz=scene.observe.band[0], harmonics=3)
+        if not scene.dampers:
+            solver.sweep(scene, harmonics=3)
+    optim.design(solver.load_scene("bladed-disk"), harmonics=3)
+
+
 def main() -> None:
     """Run each kind of computation once, on a small problem, and compile what they might call besides."""
     parser = argparse.ArgumentParser(prog="python -m service.warm_up", description="Compile the kernels.")
     parser.add_argument(
         "--first", action="store_true", help="only what a response and a design with Coulomb friction call"
     )
+    parser.add_argument("--scenes", action="store_true", help="besides, what all shipped scenes call")
     parser.add_argument("--beside", action="store_true", help="end if another process compiles already")
     asked = parser.parse_args()
     # Who compiles waits for nobody's kernels.
@@ -51,7 +64,8 @@ def main() -> None:
             compile_together([warm_up], listed=False)
             beside.compiled(beside.Stage.FIRST)
         if not asked.first:
-            compile_together([warm_up, referee, functions_of_laws])
+            more = [shipped_scenes] if asked.scenes else []
+            compile_together([warm_up, referee, functions_of_laws, *more])
             for stage in beside.Stage:
                 beside.compiled(stage)
 

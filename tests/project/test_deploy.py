@@ -85,12 +85,14 @@ def test_what_the_image_is_made_of_is_there() -> None:
         "service",
         "migrations",
         "pyproject.toml",
-        "constraints.txt",
+        "requirements",
     } <= set(copied)
     assert [name for name in copied if not (ROOT / name).exists()] == []
     allowed = (DEPLOY / "Dockerfile.dockerignore").read_text(encoding="utf-8").splitlines()
     assert {f"!{name}" for name in copied} == {line for line in allowed if line.startswith("!")}
-    assert "constraints.txt | pip install --require-hashes" in DOCKERFILE
+    for part in ("kernels", "package", "image"):
+        assert f"-r requirements/{part}.txt" in DOCKERFILE
+    assert "pip install --require-hashes" in DOCKERFILE
     assert re.search(r"\nARG PYTHON=\S+@sha256:[0-9a-f]{64}\n", DOCKERFILE)
     assert (ROOT / "service" / "warm_up.py").exists()
 

@@ -54,16 +54,14 @@ def test_no_file_names_a_registry_or_a_machine() -> None:
     assert found == []
 
 
-PARTS = ("kernels", "package", "image", "dev")
 PINNED = re.compile(
     r"(?P<name>[A-Za-z0-9_.-]+)==[A-Za-z0-9_.]+( ; [^\n\\]+)?( \\\n    --hash=sha256:[0-9a-f]{64})+\n"
 )
 
 
 def pinned(part: str) -> list[str]:
-    """The packages of a part of the constraints, each with a version and the digests of its files."""
-    every = (ROOT / "constraints.txt").read_text(encoding="utf-8")
-    text = re.split("^# ", every, flags=re.MULTILINE)[1 + PARTS.index(part)].removeprefix(f"{part}\n")
+    """The packages of a part, each with a version and the digests of its files."""
+    text = (ROOT / "requirements" / f"{part}.txt").read_text(encoding="utf-8")
     assert PINNED.sub("", text) == ""
     return [canonicalize_name(one["name"]) for one in PINNED.finditer(text)]
 

@@ -1,13 +1,17 @@
 """The demonstration, on a small case: a design and sweeps through the service, read back, drawn."""
 
+import os
 import re
+import subprocess
+import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import solver
 from service.cli import main
-from service.cli.demo import CASES, REMOVED, STUCK, DemoCase, run
+from service.cli.demo import CASES, REMOVED, STUCK, DemoCase, _told_without_compiler, run
 from service.cli.failures import ShortfallError
 from service.client.embedded import EmbeddedService
 from service.settings.settings import load_settings
@@ -48,6 +52,26 @@ def test_the_demonstration_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixt
     run(folder, [SMALL])
     with EmbeddedService(load_settings(database=f"sqlite:///{folder}/demo.db", workers=1)) as service:
         assert len([s for s in service.sweeps(limit=1000) if s.contacts["damper"].N0 == 90.0]) == 1
+
+
+@pytest.mark.long
+def test_where_nothing_is_compiled_the_first_optimum_comes_interpreted_and_once(tmp_path: Path) -> None:
+    settings = {name: value for name, value in os.environ.items() if name != "STICKSLIP_KERNELS"}
+    done = subprocess.run(
+        [sys.executable, "-c", "import sys; from service.cli import process; sys.exit(process())", "demo"],
+        env={**settings, "XDG_CACHE_HOME": str(tmp_path)}, cwd=tmp_path, capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "computed without waiting for the compiler" in done.stderr
+    assert [done.stdout.count(f"Best damper of {case.scene}") for case in CASES] == [1, 1]
+    assert len(list((tmp_path / "demo-output").glob("*.png"))) == 4
+
+
+def test_an_early_answer_is_that_of_the_command(capfd: pytest.CaptureFixture[str]) -> None:
+    assert _told_without_compiler(SMALL) == 1
+    assert re.search(r"damper\.N0 +104\.788 N", capfd.readouterr().out)
+    with pytest.raises(ShortfallError, match="nowhere"):
+        _told_without_compiler(replace(SMALL, scene="nowhere"))
 
 
 def test_the_limits_are_linear() -> None:
