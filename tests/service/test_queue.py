@@ -125,13 +125,15 @@ def test_a_waiting_job_is_dismissed_at_once_and_an_ended_one_not(lasting: Embedd
 def test_higher_priority_first_then_in_order(lasting: EmbeddedService) -> None:
     blocker = lasting.submit("iteration", {"seconds": 60.0})
     until(lambda: lasting.job(blocker).status is JobState.RUNNING)
-    low = lasting.submit("iteration", {"seed": 1, "priority": -1})
-    first = lasting.submit("iteration", {"seed": 2})
-    second = lasting.submit("iteration", {"seed": 3})
-    high = lasting.submit("iteration", {"seed": 4, "priority": 5})
+    # Several are taken at the same instant and wait in the pipe of one worker: they end one after the other.
+    short = {"seconds": 0.05}
+    low = lasting.submit("iteration", {"seed": 1, "priority": -1, **short})
+    first = lasting.submit("iteration", {"seed": 2, **short})
+    second = lasting.submit("iteration", {"seed": 3, **short})
+    high = lasting.submit("iteration", {"seed": 4, "priority": 5, **short})
     lasting.dismiss(blocker)
-    started = {job: lasting.wait(job, timeout=PATIENCE).started for job in (low, first, second, high)}
-    assert sorted(started, key=started.__getitem__) == [high, first, second, low]
+    ended = {job: lasting.wait(job, timeout=PATIENCE).finished for job in (low, first, second, high)}
+    assert sorted(ended, key=ended.__getitem__) == [high, first, second, low]
 
 
 @pytest.mark.parametrize(
