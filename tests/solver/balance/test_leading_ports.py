@@ -50,6 +50,17 @@ def test_ports_follow_from_as_few_as_their_rank(imaginary: float) -> None:
     np.testing.assert_allclose(again, rows, rtol=1e-10, atol=1e-12 * np.abs(rows).max(axis=(0, 1)).min())
 
 
+def test_ports_that_differ_by_a_phase_alone_do_not_follow() -> None:
+    """Factors of ports are real: what is out of phase with the others is another motion."""
+    rng = np.random.default_rng(5)
+    in_phase, beside = (rng.normal(size=(20, 3)) @ rng.normal(size=(3, 30)) for _ in range(2))
+    rows = (in_phase + 1j * beside)[None]
+    found = leading_ports(rows, rows.conj())
+    assert found.leading.size == 6
+    again = np.einsum("cr,srm->scm", found.span, rows[:, found.leading])
+    np.testing.assert_allclose(again, rows, rtol=1e-10, atol=1e-12)
+
+
 def test_independent_motions_are_all_kept() -> None:
     rows = np.random.default_rng(3).normal(size=(1, 12, 12)) + 0j
     found = leading_ports(rows, rows.conj())
