@@ -67,10 +67,9 @@ $(DEV): $(PACKAGES)
 	  wait $$kernels
 	@touch $(STAMP) $@
 
-# Its first optimum waits for no compiler; the set-up is completed after it.
+# Its first optimum waits for no compiler; what it does not call is compiled by whoever needs it first.
 demo: $(PACKAGES)
 	PYTHONDONTWRITEBYTECODE= $(BIN)/stickslip demo
-	@$(MAKE) --no-print-directory setup
 
 # The kernels are compiled before, so that not every process does it. Three processes for two cores: tests of the
 # service also wait, and a process computes for little more than half of its time. A file is of one of them, in
