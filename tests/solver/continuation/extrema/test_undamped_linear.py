@@ -9,7 +9,7 @@ import pytest
 from exact_linear import Exact, chain, natural_hz
 
 import solver
-from solver import Scene
+from solver import Effects, Scene
 from solver.balance.rounding import _sharpened
 from solver.continuation.branch import BranchStatus
 from solver.linear.assembly import linear_model
@@ -76,6 +76,27 @@ def test_a_mode_that_hardly_moves_at_the_force_is_driven() -> None:
     K, M, force = model.K0, model.M, force_amplitudes(model, np.array([1]))[0]
     found = _sharpened(K, M, np.array([2.0 * math.pi * mode]), force)[0]
     assert abs(found) == pytest.approx(exact_drive(K, M, force.real), rel=1e-3)
+
+
+@pytest.mark.parametrize("whole", [False, True], ids=["modes", "matrices"])
+def test_a_mode_that_rounding_alone_drives_is_not_driven(whole: bool) -> None:
+    """Two masses on a third, pressed alike: of their motion against each other 5e-20 of the drive is left."""
+    ends = {("c", "ground"): 3.1}
+    ends |= dict.fromkeys([("a", "c"), ("b", "c")], 7.3) | dict.fromkeys([("a", "ground"), ("b", "ground")], 1.7)
+    raw: dict[str, Any] = {
+        "name": "alike",
+        "structure": {
+            "kind": "lumped", "masses": {"a": 0.1, "b": 0.1, "c": 0.37},
+            "springs": [{"between": list(each), "k": k} for each, k in ends.items()],
+        },
+        "contacts": [],
+        "excitation": {"forces": {"a": 1.0, "b": 1.0}, "amplitude": 1.0},
+        "observe": {"dof": "a", "band": [1.3, 1.65]},
+    }  # fmt: skip
+    effects = Effects(whole_matrices=whole)
+    assert solver.sweep(Scene.from_dict(raw), effects=effects).status is BranchStatus.COMPLETED
+    raw["excitation"]["forces"]["b"] = 1.001
+    assert solver.sweep(Scene.from_dict(raw), effects=effects).status is BranchStatus.UNDAMPED
 
 
 def exact_drive(K: Any, M: Any, force: Any) -> float:
