@@ -82,7 +82,8 @@ def test_a_mode_that_hardly_moves_at_the_force_is_driven() -> None:
 def test_a_mode_that_rounding_alone_drives_is_not_driven(whole: bool) -> None:
     """Two masses on a third, pressed alike: of their motion against each other 5e-20 of the drive is left."""
     ends = {("c", "ground"): 3.1}
-    ends |= dict.fromkeys([("a", "c"), ("b", "c")], 7.3) | dict.fromkeys([("a", "ground"), ("b", "ground")], 1.7)
+    for mass in ("a", "b"):
+        ends |= {(mass, "c"): 7.3, (mass, "ground"): 1.7}
     raw: dict[str, Any] = {
         "name": "alike",
         "structure": {
