@@ -8,6 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 import solver
+from solver import Scene
+from solver.views.layout import layers_of, parts_of
 from solver.views.plots.scenes import MOST_PARTS, scene_figure
 
 
@@ -47,3 +49,17 @@ def test_a_scene_of_very_many_masses_is_not_drawn() -> None:
         "observe": {"dof": "m0", "band": [0.1, 0.2]},
     }
     assert scene_figure(solver.Scene.from_dict(chain)) is None
+
+
+def test_what_nothing_holds_stands_behind_all_others() -> None:
+    springs = [{"between": ["a", "ground"], "k": 7.0}, {"between": ["b", "a"], "k": 7.0}]
+    scene = Scene.from_dict(
+        {
+            "name": "free",
+            "structure": {"kind": "lumped", "masses": {"a": 1.0, "b": 1.0, "free": 1.0}, "springs": springs},
+            "contacts": [],
+            "excitation": {"dof": "a", "amplitude": 1.0},
+            "observe": {"dof": "a", "band": [0.1, 3.0]},
+        }
+    )
+    assert layers_of(parts_of(scene)) == {"ground": 0, "a": 1, "b": 2, "free": 3}
