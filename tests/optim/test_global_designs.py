@@ -173,6 +173,22 @@ def test_a_plateau_is_told_whatever_way_it_is_asked(how: dict[str, Any]) -> None
         assert (abs(branch.peak.value / found.peak.value - 1.0) <= 2e-6) is constant
 
 
+def test_on_a_plateau_the_next_peak_is_made_least() -> None:
+    """A case that counts for more sticks at every load: the load is the best one of the other case."""
+    scene, bounds = solver.load_scene("two-dof"), (60.0, 300.0)
+    idle = {"name": "idle", "weight": 40.0, "set": {"excitation.amplitude": 1.0}}
+    found = optim.design(
+        scene, variables={"damper.N0": bounds}, harmonics=5, cases=[idle, {"name": "run", "weight": 1.0}]
+    )
+    assert found.plateau["damper.N0"] == pytest.approx(bounds)
+    peaks = {}
+    for load in np.linspace(100.0, 110.0, 41):
+        branch = solver.sweep(scene.with_values({"damper.N0": float(load)}), harmonics=5)
+        assert branch.peak is not None
+        peaks[float(load)] = branch.peak.value
+    assert abs(found.optimum["damper.N0"] - min(peaks, key=peaks.__getitem__)) <= 0.25
+
+
 def test_a_sharp_optimum_has_no_plateau() -> None:
     found = optim.design(solver.load_scene("two-dof"), variables={"damper.N0": (20.0, 500.0)})
     assert not found.plateau

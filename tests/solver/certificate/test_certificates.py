@@ -35,7 +35,7 @@ def proved() -> dict[str, Any]:
     return json.loads(json.dumps(found.certificate))  # type: ignore[no-any-return]
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(4)
 @pytest.mark.parametrize("case", CERTIFIED, ids=[case["id"] for case in CERTIFIED])
 def test_orbits_with_proofs_are_proved_again(case: dict[str, Any]) -> None:
     """Periodic orbits enclosed by interval arithmetic to 18 digits, with no code of this package."""
