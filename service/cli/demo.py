@@ -5,18 +5,15 @@ This is what ``stickslip demo`` and ``make demo`` run, and an example of the ser
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
 
 import solver
 from optim.views.tables.design import design
+from service.cli.demo_cases import CASES, REMOVED, STUCK, DemoCase
 from service.cli.failures import ShortfallError
 from service.cli.progress import Reporter, bars
 from service.client.embedded import EmbeddedService
@@ -27,52 +24,16 @@ from service.jobs.kinds import warm_up
 from service.rendering.text import print_told, say
 from service.schemas.answers import JobAnswer, SweepDetail
 from service.settings.settings import load_settings
-from solver.jit import beside
 from solver.views.plots.html import save
 from solver.views.plots.responses import Family, family_figure, peak_figure
-
-REMOVED, STUCK = 0.0, 1e9
-"""Normal loads [N] at which a contact does nothing, and never slips."""
 
 _LOOK_SECONDS = 0.1
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DemoCase:
-    """What the demonstration designs and draws of a scene."""
-
-    scene: Annotated[str, "Name of a shipped scene."]
-    contact: Annotated[str, "The contact whose normal load is chosen."]
-    bounds: Annotated[tuple[float, float], "Between which it is chosen [N]."]
-    shown: Annotated[tuple[float, ...], "Loads whose responses are drawn beside the optimum's [N]."]
-    steps: Annotated[int, "Loads at which the peak is drawn, over the bounds."] = 24
-
-    @property
-    def variable(self) -> str:
-        """Path of the design variable."""
-        return f"{self.contact}.N0"
-
-    @property
-    def loads(self) -> tuple[float, ...]:
-        """The loads responses are wanted for [N]."""
-        grid = np.geomspace(*self.bounds, self.steps)
-        return (*self.shown, *(float(f"{load:.4g}") for load in grid))
-
-    @property
-    def limits(self) -> tuple[dict[str, float], dict[str, float]]:
-        """Values that make the scene linear: the contact removed, and stuck; every other contact stuck."""
-        stuck = {f"{contact.name}.N0": STUCK for contact in solver.load_scene(self.scene).contacts}
-        return {**stuck, self.variable: REMOVED}, stuck
-
-
-CASES = (
-    DemoCase(scene="two-dof", contact="damper", bounds=(20.0, 1000.0), shown=(30.0, 60.0, 200.0, 500.0)),
-    DemoCase(scene="bladed-disk", contact="shroud", bounds=(20.0, 3000.0), shown=(40.0, 90.0, 500.0, 2000.0)),
-)
-
-
-def run(folder: Path, cases: Sequence[DemoCase] = CASES) -> list[Path]:
+def run(folder: Path, cases: Sequence[DemoCase] = CASES, told: int = 0) -> list[Path]:
     """Design, read back, draw; everything goes into `folder`. Returns the pictures.
+
+    Optima of the first `told` cases are on the screen already.
 
     Raises
     ------
@@ -87,8 +48,6 @@ def run(folder: Path, cases: Sequence[DemoCase] = CASES) -> list[Path]:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"`--out`: {str(folder)!r} cannot be used: {error.strerror}") from error
-    # The first answer waits for no compiler; what follows takes longer interpreted than compiling does.
-    told = _told_without_compiler(cases[0]) if beside.missing() else 0
     # Here first: several workers would otherwise each compile the same kernels on a first run.
     warm_up()
     with EmbeddedService(load_settings(database=f"sqlite:///{folder / 'demo.db'}")) as service:
@@ -100,23 +59,6 @@ def run(folder: Path, cases: Sequence[DemoCase] = CASES) -> list[Path]:
             pictures += _draw(folder, case, optimum, _read_back(service, [design, *jobs]))
     say("\n".join(["Pictures:", *(f"  {picture}" for picture in pictures)]))
     return pictures
-
-
-def _told_without_compiler(case: DemoCase) -> int:
-    """Have another process design a damper and say what came out, kernels interpreted; how many were told.
-
-    Raises
-    ------
-    ShortfallError
-        It did not reach its goal.
-    """
-    low, high = (f"{bound:g}" for bound in case.bounds)
-    asked = ("design", case.scene, "--variable", case.variable, low, high)
-    command = "import sys; from service.cli import process; sys.exit(process())"
-    if subprocess.run([sys.executable, "-c", command, *asked], check=False).returncode != 0:
-        raise ShortfallError(f"the design of {case.scene} did not succeed")
-    say("")
-    return 1
 
 
 def _designs(service: EmbeddedService, cases: Sequence[DemoCase], told: int) -> list[JobAnswer]:

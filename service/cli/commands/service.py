@@ -64,12 +64,16 @@ def demo(
 
     Designs the dampers of two-dof and bladed-disk on an embedded service and its database.
     """
-    from service.cli.demo import run
+    from service.cli.demo_cases import first_told
 
     folder = Path(out)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"`--out` must be a folder, got {out!r}")
-    run(folder)
+    told = first_told()
+    # Database, client and drawing are loaded after the first optimum, which needs none of them.
+    from service.cli.demo import run
+
+    run(folder, told=told)
 
 
 def settings_of(**values: object) -> Settings:

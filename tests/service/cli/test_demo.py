@@ -11,7 +11,8 @@ import pytest
 
 import solver
 from service.cli import main
-from service.cli.demo import CASES, REMOVED, STUCK, DemoCase, _told_without_compiler, run
+from service.cli.demo import run
+from service.cli.demo_cases import CASES, REMOVED, STUCK, DemoCase, told_without_compiler
 from service.cli.failures import ShortfallError
 from service.client.embedded import EmbeddedService
 from service.settings.settings import load_settings
@@ -68,10 +69,10 @@ def test_where_nothing_is_compiled_the_first_optimum_comes_interpreted_and_once(
 
 
 def test_an_early_answer_is_that_of_the_command(capfd: pytest.CaptureFixture[str]) -> None:
-    assert _told_without_compiler(SMALL) == 1
+    assert told_without_compiler(SMALL) == 1
     assert re.search(r"damper\.N0 +104\.788 N", capfd.readouterr().out)
     with pytest.raises(ShortfallError, match="nowhere"):
-        _told_without_compiler(replace(SMALL, scene="nowhere"))
+        told_without_compiler(replace(SMALL, scene="nowhere"))
 
 
 def test_the_limits_are_linear() -> None:
