@@ -9,7 +9,7 @@ import numpy as np
 
 import solver
 from benchmarks.harness import check, expect, table
-from solver.studies.patterns.linear_disk import Contacts, linear_disk
+from stickslip.lab.worst_mistuning.linear_disk import Contacts, linear_disk
 
 OF, SPREAD, HARMONICS = ("tip_middle", "tip"), 0.02, 5
 STUDIES = ((8, 20, 1000, "3 min"), (24, 4, 100, "2.5 min"))  # blades, disks here, disks of a study, wanted

@@ -12,9 +12,9 @@ import numpy as np
 import optim
 import solver
 from benchmarks.harness import expect, table
-from optim.identification.posterior.reassemblies import Level
 from optim.identification.unknowns import read_unknowns
 from solver.arrays import Real
+from stickslip.lab.posterior.reassemblies import Level
 
 BOUNDS = {"damper.kt": (4.0, 40.0), "damper.mu": (0.05, 1.0)}
 VARIED = "damper.mu"

@@ -1,23 +1,23 @@
 from .errors import DataError as DataError, DesignError as DesignError
 from .identification.identify import identify as identify
-from .identification.posterior.model_choice import (
+from stickslip.lab.posterior.model_choice import (
     ChoiceStatus as ChoiceStatus,
     ModelChoice as ModelChoice,
     ModelEvidence as ModelEvidence,
     compare_models as compare_models,
 )
-from .identification.posterior.posterior import posterior as posterior
-from .identification.posterior.reassemblies import (
+from stickslip.lab.posterior.posterior import posterior as posterior
+from stickslip.lab.posterior.reassemblies import (
     Population as Population,
     ReassemblyStatus as ReassemblyStatus,
     reassemblies as reassemblies,
 )
-from .identification.posterior.result import (
+from stickslip.lab.posterior.posterior_result import (
     Marginal as Marginal,
     Posterior as Posterior,
     PosteriorStatus as PosteriorStatus,
 )
-from .identification.posterior.sampling import Sampling as Sampling
+from stickslip.lab.posterior.sampling import Sampling as Sampling
 from .identification.result import Identification as Identification, IdentifyStatus as IdentifyStatus
 from .problem.typed import Case as Case, Limit as Limit
 from .results.design import DesignResult as DesignResult, DesignStatus as DesignStatus
@@ -26,7 +26,7 @@ from .robust.result import RobustResult as RobustResult, RobustStatus as RobustS
 from .robust.robust import robust_design as robust_design
 from .search import design as design
 from .studies.campbell import campbell_diagram as campbell_diagram, forbidden_hz as forbidden_hz
-from .studies.catalogue import CatalogueResult as CatalogueResult, catalogue as catalogue
+from stickslip.lab.catalogue.catalogue import CatalogueResult as CatalogueResult, catalogue as catalogue
 from .studies.crossings import CampbellDiagram as CampbellDiagram, CampbellStatus as CampbellStatus
 from .studies.elasticities import sensitivities as sensitivities
 from .studies.pareto import pareto_front as pareto_front
@@ -35,4 +35,4 @@ from .studies.sensitivity_result import (
     SensitivityResult as SensitivityResult,
     SensitivityStatus as SensitivityStatus,
 )
-from .views.explorer import explore as explore
+from stickslip.lab.widget.explorer import explore as explore

@@ -1,5 +1,5 @@
 from .balance.simplifications import Effects as Effects
-from .certificate.certificate import (
+from stickslip.lab.proofs.certificate import (
     Certificate as Certificate,
     CertificateStatus as CertificateStatus,
     certify as certify,
@@ -28,11 +28,11 @@ from .errors import (
 from .marching.march import march as march
 from .marching.start import MarchStart as MarchStart
 from .marching.transient import transient as transient
-from .modes.certified_cycles import certify_cycle as certify_cycle
-from .modes.driven.controlled import held_amplitude as held_amplitude
-from .modes.driven.phase_resonance import phase_resonance as phase_resonance
+from stickslip.lab.proofs.certified_cycles import certify_cycle as certify_cycle
+from stickslip.lab.controlled.controlled import held_amplitude as held_amplitude
+from stickslip.lab.controlled.phase_resonance import phase_resonance as phase_resonance
 from .modes.gradient import ModeGradient as ModeGradient, mode_gradient as mode_gradient
-from .modes.limit_cycles import (
+from stickslip.lab.limit_cycles.limit_cycles import (
     LimitCycle as LimitCycle,
     LimitCycles as LimitCycles,
     limit_cycles as limit_cycles,
@@ -51,15 +51,15 @@ from .modes.results import (
     PhaseResonance as PhaseResonance,
 )
 from .response.power_balance import PowerBalance as PowerBalance, power_balance as power_balance
-from .response.quasi_periodic import quasi_periodic as quasi_periodic
-from .response.quasi_periodic_curve import (
+from stickslip.lab.quasi_periodic.quasi_periodic import quasi_periodic as quasi_periodic
+from stickslip.lab.quasi_periodic.quasi_periodic_curve import (
     QuasiPeriodicCurve as QuasiPeriodicCurve,
     TorusCurveStatus as TorusCurveStatus,
     quasi_periodic_curve as quasi_periodic_curve,
 )
 from .response.solution import Solution as Solution, SolutionStatus as SolutionStatus
 from .response.solve import solve as solve
-from .response.stability.all_solutions import (
+from stickslip.lab.all_solutions.all_solutions import (
     AllSolutions as AllSolutions,
     FoundSolution as FoundSolution,
     solve_all as solve_all,
@@ -111,7 +111,7 @@ from .sensitivity.nonsmooth import (
     PeakKind as PeakKind,
     peak_gradient as peak_gradient,
 )
-from .studies.study_results import AccuracyRow as AccuracyRow, AccuracyStudy as AccuracyStudy
+from stickslip.lab.accuracy.accuracy_result import AccuracyRow as AccuracyRow, AccuracyStudy as AccuracyStudy
 from .studies.blades import (
     BladeAmplitudes as BladeAmplitudes,
     BladePeaks as BladePeaks,
@@ -119,7 +119,7 @@ from .studies.blades import (
     blade_peaks as blade_peaks,
     mistuned as mistuned,
 )
-from .studies.convergence import accuracy_study as accuracy_study
+from stickslip.lab.accuracy.accuracy_study import accuracy_study as accuracy_study
 from .studies.instant import start_of as start_of
 from .studies.interference import interference_diagram as interference_diagram
 from .studies.margin_diagram import margin_diagram as margin_diagram
@@ -142,10 +142,10 @@ from .studies.mistuning_result import (
     MistuningStatus as MistuningStatus,
     MistuningStudy as MistuningStudy,
 )
-from .studies.patterns.climbing import WorstSearch as WorstSearch
-from .studies.patterns.intentional import IntentionalMistuning as IntentionalMistuning
-from .studies.patterns.worst import worst_mistuning as worst_mistuning
-from .studies.patterns.worst_result import (
+from stickslip.lab.worst_mistuning.climbing import WorstSearch as WorstSearch
+from stickslip.lab.worst_mistuning.intentional import IntentionalMistuning as IntentionalMistuning
+from stickslip.lab.worst_mistuning.worst import worst_mistuning as worst_mistuning
+from stickslip.lab.worst_mistuning.worst_result import (
     IntentionalPattern as IntentionalPattern,
     PatternPeak as PatternPeak,
     ResidualPeak as ResidualPeak,
@@ -164,13 +164,13 @@ from .studies.peaks.track_peak import track_peak as track_peak
 from .studies.plan import plan as plan
 from .studies.study_results import Plan as Plan
 from .studies.response_map import response_map as response_map
-from .studies.wear_life.least_worn_peak import (
+from stickslip.lab.wear_life.least_worn_peak import (
     LeastWornPeak as LeastWornPeak,
     WornStatus as WornStatus,
     least_worn_peak as least_worn_peak,
 )
-from .studies.wear_life.life import wear_life as wear_life
-from .studies.wear_life.mission import Mission as Mission
-from .studies.wear_life.life_result import WearLife as WearLife, WearLifeStatus as WearLifeStatus
-from .studies.wear_life.wearing import WearLaw as WearLaw
+from stickslip.lab.wear_life.life import wear_life as wear_life
+from stickslip.lab.wear_life.mission import Mission as Mission
+from stickslip.lab.wear_life.life_result import WearLife as WearLife, WearLifeStatus as WearLifeStatus
+from stickslip.lab.wear_life.wearing import WearLaw as WearLaw
 from .views.io import load as load, save as save

@@ -15,6 +15,7 @@ from importlib import import_module
 from typing import Any, Generic, TypeVar
 
 from solver.errors import SettingError
+from solver.lab import is_there
 
 VARIABLE = "STICKSLIP_EXTENSIONS"
 T = TypeVar("T")
@@ -102,7 +103,9 @@ class Kinds(Generic[T]):
             One from outside has the word of another.
         """
         if self._shipped is None:
-            found = [getattr(import_module(module), self._name) for module in self._modules]
+            found = [
+                getattr(import_module(module), self._name) for module in self._modules if is_there(module)
+            ]
             self._shipped = tuple(one for own in found for one in (own if isinstance(own, tuple) else (own,)))
         outside = (*extensions(self._base), *self.added)
         taken = {word: one for one in self._shipped for word in self._words(one)} if outside else {}

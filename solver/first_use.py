@@ -14,6 +14,8 @@ from importlib import import_module
 from types import FunctionType
 from typing import ParamSpec, TypeVar
 
+from solver.lab import LAB, is_there
+
 _Given = ParamSpec("_Given")
 _Found = TypeVar("_Found")
 
@@ -30,6 +32,7 @@ def names_in(file: str, package: str) -> dict[str, str]:
     return {
         name.split()[0]: f"{package}{module}" if module.startswith(".") else module
         for module, _, names in statements
+        if is_there(module)
         for name in names.partition(")")[0].strip("( \n").split(",")
         if name.strip()
     }
@@ -47,7 +50,7 @@ def on_first_use(
         if name in _OF_KERNELS and (first := _first_call(package, name)):
             return first
         value = getattr(import_module(homes[name]), name)
-        if homes[name].startswith(f"{package}."):  # not what another package has made public already
+        if homes[name].startswith((f"{package}.", LAB)):  # not what another package has made public already
             value = _of_a_scene(value, package)
         setattr(sys.modules[package], name, value)
         return value

@@ -29,7 +29,7 @@ def __getattr__(name: str) -> object:
     if name in _homes or name.startswith("_"):
         return _load(name)
     for subject in _SUBJECTS:
-        if name in names_in(f"{__path__[0]}/{subject}.py", __name__):
+        if name in names_in(f"{__path__[0]}/{subject}.pyi", __name__):
             import warnings
 
             told = f"stickslip.{name} is stickslip.{subject}.{name} now; the short form goes with 0.2"

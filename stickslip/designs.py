@@ -1,24 +1,5 @@
 """Designs: what they return, and the gradients that searches of one's own need."""
 
-from optim import (
-    CatalogueOption as CatalogueOption,
-    CatalogueResult as CatalogueResult,
-    DesignStatus as DesignStatus,
-    OptionStatus as OptionStatus,
-    ParetoResult as ParetoResult,
-    ParetoStatus as ParetoStatus,
-    RobustResult as RobustResult,
-    RobustStatus as RobustStatus,
-    SensitivityResult as SensitivityResult,
-    SensitivityStatus as SensitivityStatus,
-    catalogue as catalogue,
-)
-from solver import (
-    AllowedExcitation as AllowedExcitation,
-    AmplitudeHessian as AmplitudeHessian,
-    Gradient as Gradient,
-    MarginDiagram as MarginDiagram,
-    MarginStatus as MarginStatus,
-    Sensitivities as Sensitivities,
-    margin_diagram as margin_diagram,
-)
+from solver.first_use import names_of, on_first_use
+
+__getattr__, __dir__, __all__ = on_first_use(__name__, names_of(__name__, __file__))

@@ -1,16 +1,5 @@
 """Every error that is raised on purpose."""
 
-from optim import (
-    DataError as DataError,
-    DesignError as DesignError,
-)
-from service.errors import ServiceProblem as ServiceProblem
-from solver import (
-    Issue as Issue,
-    MissingExtraError as MissingExtraError,
-    ResultFileError as ResultFileError,
-    SceneError as SceneError,
-    SettingError as SettingError,
-    SolverError as SolverError,
-    StoppedError as StoppedError,
-)
+from solver.first_use import names_of, on_first_use
+
+__getattr__, __dir__, __all__ = on_first_use(__name__, names_of(__name__, __file__))

@@ -1,9 +1,5 @@
 """Scenes for other programs: their equations for MATLAB, and a functional mock-up unit (FMI 2.0)."""
 
-from optim.doors.equations_of_motion import (
-    ContactRows as ContactRows,
-    EquationsOfMotion as EquationsOfMotion,
-    equations_of as equations_of,
-)
-from optim.doors.fmu import save_fmu as save_fmu
-from optim.doors.matlab import save_mat as save_mat
+from solver.first_use import names_of, on_first_use
+
+__getattr__, __dir__, __all__ = on_first_use(__name__, names_of(__name__, __file__))

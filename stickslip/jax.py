@@ -1,9 +1,5 @@
 """Answers as functions of JAX, with their exact derivatives; needs ``pip install 'stickslip[jax]'``."""
 
-from optim.doors.jax import (
-    damping_ratio as damping_ratio,
-    least_peak as least_peak,
-    of_arrays as of_arrays,
-    peak as peak,
-    solve as solve,
-)
+from solver.first_use import names_of, on_first_use
+
+__getattr__, __dir__, __all__ = on_first_use(__name__, names_of(__name__, __file__))

@@ -1,7 +1,5 @@
 """Friction laws of one's own, and polynomial tensors as contacts."""
 
-from solver import (
-    LawParameter as LawParameter,
-    register_law as register_law,
-    tensor_springs as tensor_springs,
-)
+from solver.first_use import names_of, on_first_use
+
+__getattr__, __dir__, __all__ = on_first_use(__name__, names_of(__name__, __file__))

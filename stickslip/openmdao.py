@@ -1,10 +1,5 @@
 """Answers as components of OpenMDAO, with their exact derivatives; extra `openmdao`."""
 
-from optim.doors.functions import (
-    ExactFunction as ExactFunction,
-    damping_ratio as damping_ratio,
-    least_peak as least_peak,
-    peak as peak,
-    solve as solve,
-)
-from optim.doors.openmdao import FrictionComponent as FrictionComponent
+from solver.first_use import names_of, on_first_use
+
+__getattr__, __dir__, __all__ = on_first_use(__name__, names_of(__name__, __file__))

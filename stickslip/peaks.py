@@ -1,16 +1,5 @@
 """Peaks over a parameter: followed, least, differentiated."""
 
-from solver import (
-    Band as Band,
-    Basin as Basin,
-    EdgeHessian as EdgeHessian,
-    LeastPeak as LeastPeak,
-    PeakGradient as PeakGradient,
-    PeakHessian as PeakHessian,
-    PeakKind as PeakKind,
-    PeakTrack as PeakTrack,
-    TrackStatus as TrackStatus,
-    least_peak as least_peak,
-    peak_gradient as peak_gradient,
-    track_peak as track_peak,
-)
+from solver.first_use import names_of, on_first_use
+
+__getattr__, __dir__, __all__ = on_first_use(__name__, names_of(__name__, __file__))

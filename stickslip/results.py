@@ -1,13 +1,5 @@
 """What results share, and results of studies."""
 
-from solver import (
-    AccuracyRow as AccuracyRow,
-    AccuracyStudy as AccuracyStudy,
-    Dataset as Dataset,
-    MapStatus as MapStatus,
-    Plan as Plan,
-    ResponseMap as ResponseMap,
-    Shown as Shown,
-    Summary as Summary,
-    Variable as Variable,
-)
+from solver.first_use import names_of, on_first_use
+
+__getattr__, __dir__, __all__ = on_first_use(__name__, names_of(__name__, __file__))

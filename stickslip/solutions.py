@@ -1,28 +1,5 @@
 """One response: its motion in time, a run through many, power, stability, uniqueness, all that there are."""
 
-from solver import (
-    QuasiPeriodicCurve as QuasiPeriodicCurve,
-    TorusCurveStatus as TorusCurveStatus,
-    AllSolutions as AllSolutions,
-    AmplitudeRange as AmplitudeRange,
-    Certificate as Certificate,
-    CertificateStatus as CertificateStatus,
-    FoundSolution as FoundSolution,
-    Growth as Growth,
-    MarchStart as MarchStart,
-    PowerBalance as PowerBalance,
-    Shares as Shares,
-    SolutionStatus as SolutionStatus,
-    Stability as Stability,
-    Uniqueness as Uniqueness,
-    amplitude_range as amplitude_range,
-    hysteresis_loop as hysteresis_loop,
-    motion as motion,
-    power_balance as power_balance,
-    quasi_periodic as quasi_periodic,
-    quasi_periodic_curve as quasi_periodic_curve,
-    start_of as start_of,
-    time_history as time_history,
-    transient as transient,
-    uniqueness as uniqueness,
-)
+from solver.first_use import names_of, on_first_use
+
+__getattr__, __dir__, __all__ = on_first_use(__name__, names_of(__name__, __file__))

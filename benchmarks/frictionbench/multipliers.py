@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from flint import arb, arb_mat
 
-from solver.certificate.checker import OPEN, Orbit, System
+from stickslip.lab.proofs.checker import OPEN, Orbit, System
 
 SQUARINGS = 20  # of the monodromy, for the bounds of its spectral radius
 ROUNDED = 1e-9  # what bounds are wider by, since they are written in ten digits

@@ -19,7 +19,7 @@ are in `benchmarks/frictionbench`; `python -m benchmarks.frictionbench archive` 
 Answers come by two ways: a closed form, or exact events in balls of 128 and more bits
 with an enclosure (`proofs.py`), and harmonic balance at H, 2H, 4H … harmonics, extrapolated; where these
 agree in fewer than ten digits, time marching too. {proved} answers have a proof in `proofs/`:
-`python solver/certificate/checker.py FILE` shows anew that the orbit exists, that it obeys every law of its
+`python stickslip/lab/proofs/checker.py FILE` shows anew that the orbit exists, that it obeys every law of its
 contacts and how high it is, and needs nothing but python-flint. Losses are read off orbits that are
 enclosed alike. Rigid friction has no balance: a closed form or exact events in floats stand beside its
 proof. Of {cases} answers {ten} agree to ten digits or more; the column *known*

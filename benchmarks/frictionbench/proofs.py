@@ -1,7 +1,7 @@
 """Proved answers: exact events in extended precision, enclosed in balls by Krawczyk's operator.
 
-What is proved is checked by `solver/certificate/checker.py`, which needs nothing of stickslip; only where to
-look comes from the balance.
+What is proved is checked by `stickslip/lab/proofs/checker.py`, which needs nothing of stickslip; only where
+to look comes from the balance.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from flint import arb, ctx
 import stickslip
 from benchmarks.frictionbench import multipliers, scenes
 from benchmarks.frictionbench.model import Case, NotOfferedError, piecewise_linear
-from solver.certificate.checker import STICK, Orbit, System, around, radii
-from solver.modes.certified_cycles import certify_cycle
+from stickslip.lab.proofs.certified_cycles import certify_cycle
+from stickslip.lab.proofs.checker import STICK, Orbit, System, around, radii
 
 Answer = dict[str, Any]
 HARMONICS = 41  # of the balance that says where to look

@@ -10,8 +10,8 @@ import numpy as np
 
 import stickslip
 from benchmarks.frictionbench.model import Case, NotOfferedError, piecewise_linear
-from solver.response.exact.answer import solve_exactly
-from solver.studies.patterns.bounds import whitehead
+from stickslip.lab.proofs.exact.answer import solve_exactly
+from stickslip.lab.worst_mistuning.bounds import whitehead
 
 OF_WORK = 400  # harmonics in which the friction work of an exact motion is summed
 

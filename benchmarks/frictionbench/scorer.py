@@ -16,7 +16,7 @@ from typing import Any
 from benchmarks.frictionbench import fence
 from benchmarks.frictionbench.asking import ADAPTERS, ROOT, Code, Score, scaled
 from benchmarks.frictionbench.model import HERE, load, names
-from solver.certificate import checker
+from stickslip.lab.proofs import checker
 
 RESULTS, MADE = HERE / "results", ROOT / ".frictionbench"
 MOST = 15.6  # digits of a double

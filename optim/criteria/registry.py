@@ -19,7 +19,7 @@ SHIPPED = (
     "optim.criteria.running_speeds",
     "optim.criteria.friction_work",
     "optim.criteria.wear_rate",
-    "optim.criteria.worn_peak",
+    "stickslip.lab.wear_life.worn_peak",
     "optim.criteria.damping",
     "optim.criteria.quality",
     "optim.criteria.mass",

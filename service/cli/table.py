@@ -15,6 +15,8 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from service.jobs.names import home_of
+from solver.lab import LAB, is_there
 from solver.results.views import on_demand
 
 STUDY = "study"
@@ -27,7 +29,8 @@ class CommandEntry:
     name: Annotated[str, "As the user writes it."]
     home: Annotated[
         str,
-        'Module of `service.cli` and function, ``"commands.scenes.scenes"``; `STUDY` for that of a study.',
+        'Module of `service.cli` and function, ``"commands.scenes.scenes"``, or the whole name of one in the '
+        "lab; `STUDY` for that of a study.",
     ]
     summary: Annotated[str, "The first line of the function's docstring, which `--help` shows."]
     keyed: Annotated[bool, "It talks to a service, and takes ``--url`` and ``--key-file``."] = False
@@ -45,7 +48,11 @@ class CommandEntry:
 
             return command_of(study_named(self.name))
         module, _, name = self.home.rpartition(".")
-        return on_demand(f"service.cli.{module}:{name}")
+        return on_demand(f"{module if module.startswith(LAB) else f'service.cli.{module}'}:{name}")
+
+    def is_there(self) -> bool:
+        """Whether the folder of the lab it stands in is there, if it stands in one."""
+        return is_there(home_of(self.name) if self.home == STUDY else self.home)
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +107,8 @@ class LazyGroup(TyperGroup):
     def add(self, heading: str, entries: Iterable[CommandEntry | CommandGroup]) -> None:
         """Add commands, which help lists below a heading, in their order."""
         for entry in entries:
+            if isinstance(entry, CommandEntry) and not entry.is_there():
+                continue
             self.add_command(entry.command())
             self.headings[entry.name] = heading
 
@@ -223,7 +232,7 @@ COMMANDS = {
             "Find parameters from measured responses and hysteresis loops.",
         ),
         CommandEntry(
-            "posterior", "commands.identify.posterior",
+            "posterior", "stickslip.lab.posterior.commands.posterior",
             "Sample what is known of parameters after measurements.",
         ),
     ),
@@ -249,7 +258,7 @@ COMMANDS = {
             "import", "commands.import_matrices.import_scene", "Make a scene of matrices or modes in files.",
         ),
         CommandEntry(
-            "export", "commands.exports.export",
+            "export", "stickslip.lab.exports.commands.export",
             "Write a scene for other programs: equations for MATLAB, a unit for co-simulation (FMI 2.0).",
         ),
         CommandEntry(
@@ -261,7 +270,7 @@ COMMANDS = {
             "Write the report of a design or an identification that the service computed.", keyed=True,
         ),
         CommandEntry(
-            "check-proof", "commands.certificates.check_proof",
+            "check-proof", "stickslip.lab.proofs.commands.check_proof",
             "Check the proofs in a file that `solve`, `peaks`, `design` or `modes --certify --json` wrote.",
         ),
         CommandEntry("demo", "commands.service.demo", "Run the main job end to end, with pictures."),

@@ -29,6 +29,7 @@ from service.jobs.common.scenes import (
     resolved,
     stored_scene,
 )
+from service.jobs.names import home_of
 from service.jobs.registry import (
     JobKind,
     Json,
@@ -276,7 +277,7 @@ def resolve(request: Study, source: SceneSource) -> Resolved:
 
 
 def study_named(name: str) -> type[Study]:
-    """Return a study that comes with the service; its module is called as it is, and has it alone."""
-    module = import_module(f"service.jobs.studies.{name.replace('-', '_')}")
+    """Return a study that comes with the service or the lab; its module has it alone."""
+    module = import_module(home_of(name))
     made: list[type[Study]] = [one for one in vars(module).values() if getattr(one, "NAME", "") == name]
     return made[-1]

@@ -20,11 +20,12 @@ _NO_CODE = ("beside", "clock", "folder", "interpreted", "lapack_loading", "paral
 
 def _source_hash() -> str:
     """Return a hash of the kernels' sources and of what compiles them."""
-    solver = Path(__file__).parent.parent
-    jit = [one for one in solver.glob("jit/*.py") if one.stem not in _NO_CODE]
+    home = Path(__file__).parent.parent.parent
+    jit = [one for one in home.glob("solver/jit/*.py") if one.stem not in _NO_CODE]
+    kernels = [*home.glob("solver/**/kernels/**/*.py"), *home.glob("stickslip/lab/*/kernels/*.py")]
     digest = hashlib.sha256(version("numba").encode())
-    for source in (*sorted(jit), *sorted(solver.glob("**/kernels/**/*.py"))):
-        digest.update(source.relative_to(solver).as_posix().encode() + source.read_bytes())
+    for source in (*sorted(jit), *sorted(kernels)):
+        digest.update(source.relative_to(home).as_posix().encode() + source.read_bytes())
     return digest.hexdigest()[:16]
 
 

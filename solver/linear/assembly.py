@@ -219,3 +219,20 @@ def _contact_selection(dofs: tuple[str, ...], forms: tuple[Form, ...]) -> tuple[
 @lru_cache(maxsize=1024)
 def _unit(dofs: Sequence[str], dof: str) -> FloatArray:
     return frozen(np.array([1.0 if name == dof else 0.0 for name in dofs]))
+
+
+def check_structure(scene: Scene, model: LinearModel, where: str) -> None:
+    """Refuse what is no system of ordinary differential equations under forces; `where` that is asked for."""
+    structure = scene.structure
+    if model.sectors > 1 or structure.has_sectors:
+        raise SettingError("structure", structure.kind, f"must be without sectors {where}")
+    if model.extra is not None and not model.extra.is_real:
+        raise SettingError(
+            "loss_factor", structure.loss_factor, f"must be 0 {where}: it has no meaning in time"
+        )
+    if model.points:
+        wanted = f"must make no point without inertia {where}"
+        raise SettingError("couplings", scene.points[0], wanted)
+    if model.prescribed or model.line is not None:
+        what = "excitation" if model.prescribed else "speed_order"
+        raise SettingError(what, scene.name, f"must be forces at a fixed speed {where}")

@@ -18,7 +18,7 @@ from scipy.sparse import csr_array, diags_array
 
 from solver.errors import SettingError
 from solver.jit.clock import clock
-from solver.marching import moreau
+from solver.lab import from_lab
 from solver.marching.contacts import as_sparse, rows
 from solver.marching.equations import MarchEquations, equations_of_motion
 from solver.marching.kernels import state as kernel
@@ -163,7 +163,7 @@ def marched(
     system, rigid = equations.system, scene.rigid_contact is not None
     if rigid:
         system = system._replace(kt=_finite(system.kt), kn=_finite(system.kn))
-    steps = steps_for(system, scene.forces, steps_per_period, moreau.STEPS if rigid else 0)
+    steps = steps_for(system, scene.forces, steps_per_period, from_lab("proofs.moreau:STEPS") if rigid else 0)
     return scene, equations, steps
 
 
@@ -220,6 +220,7 @@ def _twice_rigid(
     frequency_hz: float,
 ) -> MarchResult:  # fmt: skip
     """The same by Moreau's steps."""
+    moreau = from_lab("proofs.moreau")
     x, v, runs, done = start.x.copy(), start.v.copy(), [], 0
     for each in (steps // 2, steps):
 

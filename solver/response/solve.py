@@ -24,6 +24,7 @@ from solver.continuation.from_nothing import solve_from_nothing
 from solver.jit import fourier
 from solver.jit.clock import clock
 from solver.jit.fourier import Real
+from solver.lab import from_lab
 from solver.linear.condensation import loose_ports
 from solver.linear.modal import undamped_resonance
 from solver.response.contact_response import contact_responses, flags_of
@@ -58,8 +59,8 @@ def solve(
     accuracy : estimated error of the amplitude, relative to it, that the fewest harmonics are chosen for.
     effects : what is paid for though the scene does not call for it; see
     `solver.balance.simplifications.Effects`.
-    exact : from there follow the events of the contacts, to rounding (`solver.response.exact`), as is always
-    done of scenes with rigid contacts, from rest. Where no orbit is found the balance answers, with
+    exact : from there follow the events of the contacts, to rounding (`stickslip.lab.proofs.exact`), as is
+    always done of scenes with rigid contacts, from rest. Where no orbit is found the balance answers, with
     ACCURACY_NOT_REACHED.
 
     Raises
@@ -74,9 +75,8 @@ def solve(
     good_enough = True
     rigid = scene.rigid_contact is not None
     if exact or rigid:
-        from solver.response.exact.answer import solve_exactly  # loaded where it is asked for
-
-        orbit = solve_exactly(scene, frequency_hz, check_harmonics(harmonics))
+        solve_exactly = from_lab("proofs.exact.answer:solve_exactly")
+        orbit: Solution = solve_exactly(scene, frequency_hz, check_harmonics(harmonics))
         if rigid or orbit.converged:
             return orbit
         good_enough = False
@@ -104,7 +104,7 @@ def solve(
     solution = describe(workspace, found, frequency_hz, begun)
     solution = replace(solution, flags=(*solution.flags, *assumed_flags(workspace.balance), *flags))
     if exact:
-        polished = solve_exactly(scene, frequency_hz, harmonics, near=solution)
+        polished: Solution = solve_exactly(scene, frequency_hz, harmonics, near=solution)
         if polished.converged:
             return polished
         good_enough = False

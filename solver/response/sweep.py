@@ -11,6 +11,7 @@ from solver.continuation.branch import AnyBranch, Branch
 from solver.continuation.branches.sweep import sweep as by_continuation
 from solver.continuation.segment import Course
 from solver.continuation.settings import ContinuationSettings
+from solver.lab import from_lab
 from solver.scene.scene import Scene
 
 _IN_A_RECORD = {
@@ -29,16 +30,15 @@ def _gather(options: dict[str, Any]) -> None:
 
 
 def _exactly_where_rigid(continued: Callable[_Given, Branch]) -> Callable[_Given, AnyBranch]:
-    """Give rigid contacts, for which there is no balance, to `solver.response.exact.sweep`."""
+    """Give rigid contacts, for which there is no balance, to `stickslip.lab.proofs.exact.exact_sweep`."""
 
     @wraps(continued)
     def sweep(*args: _Given.args, **options: _Given.kwargs) -> AnyBranch:
         _gather(options)
         scene = args[0] if args else options.get("scene")
         if isinstance(scene, Scene) and scene.rigid_contact is not None:
-            from solver.response.exact.sweep import sweep_exactly  # loaded where it is asked for
-
-            return sweep_exactly(*args, **options)  # type: ignore[arg-type]
+            found: AnyBranch = from_lab("proofs.exact.exact_sweep:sweep_exactly")(*args, **options)
+            return found
         return continued(*args, **options)
 
     return sweep

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
+from solver.lab import LAB
+
 
 @dataclass(frozen=True, slots=True)
 class Data:
@@ -43,7 +45,8 @@ class Views:
 
     Parameters
     ----------
-    package : where ``tables``, ``summary``, ``to_dataset`` and ``plots.figures`` stand.
+    package : where ``tables``, ``summary``, ``to_dataset`` and ``plots.figures`` stand; a folder of the lab
+        has its functions in ``tables`` and ``pictures``, and names them alone.
     told : ``module:name`` of a function in ``tables`` that puts in words what `to_json` gives, or the name of
         one of ``summary``.
     dataset : name of a function; ``described`` makes the data set that the class says.
@@ -63,9 +66,13 @@ class Views:
             "to_dataset": ("", "to_dataset:", self.dataset),
             "figure": ("plots.", "plots.figures:", self.figure),
         }[what]
+        if self.package.startswith(LAB) and what != "to_dataset":
+            module = "tables" if what == "told" else "pictures"
+            return on_demand(f"{self.package}.{module}:{name}")(result.to_json(), *arguments, **options)
         if ":" in name:
             return on_demand(f"{self.package}.{of_json}{name}")(result.to_json(), *arguments, **options)
-        return on_demand(f"{self.package}.{of_result}{name}")(result, *arguments, **options)
+        package = "solver.views" if self.package.startswith(LAB) else self.package
+        return on_demand(f"{package}.{of_result}{name}")(result, *arguments, **options)
 
 
 def on_demand(place: str) -> Callable[..., Any]:

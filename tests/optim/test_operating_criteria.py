@@ -15,12 +15,12 @@ from optim.criteria.mass import MASS
 from optim.criteria.quality import QUALITY
 from optim.criteria.running_speeds import RUNNING
 from optim.criteria.wear_rate import WEAR_RATE
-from optim.criteria.worn_peak import WORN
 from optim.errors import DesignError
 from optim.problem.issues import problem_issues
 from optim.problem.problem import pose
 from solver.modes.at_amplitudes import mode_at_amplitudes
 from solver.scene.scene import Scene
+from stickslip.lab.wear_life.worn_peak import WORN
 
 HARMONICS = 5
 VARIABLES = {"damper.N0": (20.0, 400.0), "damper.kt": (10.0, 60.0)}

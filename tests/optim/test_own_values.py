@@ -106,7 +106,7 @@ def test_uncertain_values_leave_a_case_what_it_sets(uncertain: Any, name: str) -
 
 
 def test_options_leave_nothing_behind_that_is_overwritten() -> None:
-    from optim.studies.catalogue import check_options
+    from stickslip.lab.catalogue.catalogue import check_options
 
     options = {"tied": {"damper.N1": 20.0}}
     with pytest.raises(DesignError, match=r"does not stay as it is beside damper\.N1_ratio"):

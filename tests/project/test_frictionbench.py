@@ -15,7 +15,7 @@ from flint import arb, arb_mat
 import stickslip
 from benchmarks.frictionbench import answers, multipliers, proofs, scenes, scorer
 from benchmarks.frictionbench.model import HERE, load, model, names
-from solver.certificate import checker
+from stickslip.lab.proofs import checker
 
 FAST = (
     "den-hartog-0.8", "den-hartog-stops", "sinha-griffin-repelling", "one-slider", "moving-load-phase",

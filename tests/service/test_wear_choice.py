@@ -8,8 +8,8 @@ from service_helpers import Shipped
 import solver
 from service.errors import InvalidRequestError
 from service.jobs.strict_json import validated
-from service.jobs.studies.wear import Wear
 from service.jobs.study import Watch, resolve
+from stickslip.lab.wear_life.study import Wear
 
 BODY: dict[str, Any] = {
     "scene": "two-dof", "hours": 3e-4, "coefficient": {"damper": 1e-11}, "area": {"damper": 2e-4},

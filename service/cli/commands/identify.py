@@ -1,4 +1,4 @@
-"""`stickslip identify` and `posterior`: parameters of a scene from measured responses and loops."""
+"""`stickslip identify`: parameters of a scene from measured responses and loops."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from service.cli.failures import refused
 from service.cli.options import inputs
 from service.cli.study_command import Keys, Outputs, give, watched
 from service.jobs.studies.identify import Identify
-from service.jobs.studies.posterior import PosteriorStudy
 from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
@@ -72,10 +71,10 @@ def _identify(
     told = inputs.output_path("--report", report, SUFFIXES)
     scene = inputs.scene(name, values)
     asked = {"data": data, **_KEYS.read(given)}
-    answer = _computed(_KEYS, scene, asked, column)
+    answer = computed(_KEYS, scene, asked, column)
     found: Any = answer.result
     if problem is not None and found.fitted:
-        _write(problem, name, {**inputs.settings(values), **found.values}, found.uncertain)
+        write_problem(problem, name, {**inputs.settings(values), **found.values}, found.uncertain)
     if told is not None:
         from service.rendering.report.sections import Designed
 
@@ -84,7 +83,7 @@ def _identify(
     give(Identify, answer, outputs, scene, as_json=as_json)
 
 
-def _computed(keys: Keys, scene: Scene, asked: dict[str, Any], columns: list[str] | None) -> Answer:
+def computed(keys: Keys, scene: Scene, asked: dict[str, Any], columns: list[str] | None) -> Answer:
     """Compute what is asked of files."""
     study = keys.study
     if wrong := study.model_construct(**asked).issues(scene):
@@ -97,24 +96,6 @@ def _computed(keys: Keys, scene: Scene, asked: dict[str, Any], columns: list[str
         return study.compute(scene, asked, watch)
 
 
-def _posterior(
-    name: str, data: list[str], column: list[str] | None, values: list[str] | None, plot: str | None,
-    out: str | None, uncertain: str | None, as_json: bool, **given: Any,
-) -> None:  # fmt: skip
-    outputs = Outputs.asked(plot, out)
-    problem = inputs.output_path("--uncertain", uncertain, (".toml",))
-    scene = inputs.scene(name, values)
-    answer = _computed(_OF_POSTERIOR, scene, {"data": data, **_OF_POSTERIOR.read(given)}, column)
-    kept = getattr(answer.result, "uncertain", None)
-    if problem is not None and kept:
-        _write(problem, name, inputs.settings(values), kept)
-    give(PosteriorStudy, answer, outputs, scene, as_json=as_json)
-
-
-_OF_POSTERIOR = Keys.of(PosteriorStudy, "data")
-posterior = _OF_POSTERIOR.command(
-    _posterior, {"data": Data}, {"column": Columns, "uncertain": Uncertain}, doc=PosteriorStudy.__doc__
-)
 _KEYS = Keys.of(Identify, "data")
 identify = _KEYS.command(
     _identify,
@@ -124,7 +105,7 @@ identify = _KEYS.command(
 )
 
 
-def _write(file: Path, name: str, values: dict[str, float], uncertain: Any) -> None:
+def write_problem(file: Path, name: str, values: dict[str, float], uncertain: Any) -> None:
     """Write the scene with values as a design problem with what is left uncertain."""
     from solver.scene.toml import toml_text
 

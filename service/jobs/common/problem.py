@@ -15,6 +15,7 @@ from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.registry import ABOUT_THE_JOB, JobKind
 from service.jobs.study import Study
 from solver.errors import Issue
+from solver.lab import from_lab
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -37,10 +38,9 @@ class ProblemRequest(ProblemKeys, Study, HarmonicRequest):
         known = {key: value for key, value in given.items() if key not in _OF_OTHERS}
         if OPTIONS not in given:
             return problem_issues(scene, known)
-        from optim.studies.catalogue import check_options, with_variables
-
-        found = problem_issues(scene, with_variables(known))
-        return found or reading_issues(partial(check_options, scene, given[OPTIONS], known), given)
+        catalogue = from_lab("catalogue.catalogue")
+        found = problem_issues(scene, catalogue.with_variables(known))
+        return found or reading_issues(partial(catalogue.check_options, scene, given[OPTIONS], known), given)
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""

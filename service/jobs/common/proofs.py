@@ -9,9 +9,9 @@ from pydantic import Field
 
 from service.jobs.common.results import Table
 from service.jobs.study import Answer, Watch
+from solver.lab import from_lab
 
 if TYPE_CHECKING:
-    from solver.certificate.certificate import Certificate
     from solver.scene.scene import Scene
 
 Certify = Annotated[
@@ -25,9 +25,7 @@ CERTIFICATES: Any = (
 
 def prepare(scene: Scene, *, rigid: bool = True) -> None:
     """Refuse what cannot be proved before anything is computed; `rigid`: friction may be."""
-    from solver.certificate.certificate import check_certifiable
-
-    check_certifiable(scene, rigid=rigid)
+    from_lab("proofs.certificate:check_certifiable")(scene, rigid=rigid)
 
 
 def with_proofs(
@@ -35,15 +33,16 @@ def with_proofs(
 ) -> Answer:
     """Return an answer with proofs of peaks; it falls short if one is not proved.
 
-    Arguments as of `solver.certificate.certified_peaks.certified_peaks`.
+    Arguments as of `stickslip.lab.proofs.certified_peaks.certified_peaks`.
     """
-    from solver.certificate.certified_peaks import certified_peaks
+    certified_peaks = from_lab("proofs.certified_peaks:certified_peaks")
+    return with_certificates(
+        answer, certified_peaks(peaks, least_over=least_over, should_stop=watch.should_stop)
+    )
 
-    return beside(answer, certified_peaks(peaks, least_over=least_over, should_stop=watch.should_stop))
 
-
-def beside(answer: Answer, found: Sequence[Certificate]) -> Answer:
-    """Return an answer with proofs; it falls short if one is not reached."""
+def with_certificates(answer: Answer, found: Sequence[Any]) -> Answer:
+    """Return an answer with certificates; it falls short if one is not reached."""
     missing = [each.status.value for each in found if not each.reached]
     return answer._replace(
         json=answer.json | {"certificates": [each.to_json() for each in found]},

@@ -1,4 +1,4 @@
-"""The kinds of job that come with the service; a further one is one module and one entry here."""
+"""The kinds of job that come with the service, in the order of `service.jobs.names`."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import optim
 import solver
+from service.jobs.names import there
 from service.jobs.registry import Registry
 from service.jobs.study import Study, study_named
 from solver.jit.beside import ready
@@ -20,12 +21,7 @@ def warm_up() -> None:
     optim.design(scene, harmonics=3)
 
 
-NAMES = (
-    "sweep", "map", "peaks", "design", "pareto", "margin", "solve", "march", "transient", "quasi-periodic",
-    "wear", "accuracy", "campbell", "interference", "mistuning", "worst-mistuning", "identify", "posterior",
-    "modes", "controlled", "sensitivities", "plan",
-)  # fmt: skip
-SHIPPED = Registry([study_named(name).as_kind() for name in NAMES], warm_up)
+SHIPPED = Registry([study_named(name).as_kind() for name in there()], warm_up)
 
 
 def studies(registry: Registry = SHIPPED) -> Mapping[str, type[Study]]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cache, partial
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, Field, RootModel
 
 import solver
-from service.jobs.common.proofs import CERTIFICATES, beside, prepare
+from service.jobs.common.proofs import CERTIFICATES, prepare, with_certificates
 from service.jobs.common.results import Table, answered
 from service.jobs.common.scenes import HarmonicRequest, Number, PositiveNumber, check
 from service.jobs.common.sizes import MOST_MOTIONS, POINTS_OF_A_SWEEP, balance_issues
@@ -17,6 +17,7 @@ from service.jobs.common.study_keys import of_keys
 from service.jobs.registry import Flag, Json, ReadSweep, StoredSweep
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue, Naming
+from solver.lab import from_lab
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -183,7 +184,6 @@ class Modes(Study, HarmonicRequest):
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return which questions do not go together, and what is wrong with the mode."""
-        from solver.modes.limit_cycles import check_loads
         from solver.modes.nonlinear_mode import at_nodal_diameter, check_mode
 
         fed = self.aero_damping is not None
@@ -201,7 +201,13 @@ class Modes(Study, HarmonicRequest):
             ("phase_resonance", apart, "is a curve of its own: leave {performance} and {aero_damping} out"),
         )  # fmt: skip
         wrong = [Issue((key,), Naming(said)) for key, bad, said in words if bad]
-        wrong += of_keys(check(partial(check_loads, scene)), (), "aero_damping") if fed else []
+        wrong += (
+            of_keys(
+                check(lambda: from_lab("limit_cycles.limit_cycles:check_loads")(scene)), (), "aero_damping"
+            )
+            if fed
+            else []
+        )
         return wrong + check(lambda: check_mode(at_nodal_diameter(scene, self.nodal_diameter), self.mode))
 
     def sizes(self, scene: Scene) -> list[Issue]:
@@ -240,7 +246,7 @@ class Modes(Study, HarmonicRequest):
                 proofs = [
                     solver.certify_cycle(scene, each, ratio, should_stop=stop) for each in cycles.cycles
                 ]
-                answer = beside(answer, proofs)
+                answer = with_certificates(answer, proofs)
         if asked.get("motions"):
             answer.json["motions"] = motions_of(found)
         return answer

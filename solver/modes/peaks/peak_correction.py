@@ -21,7 +21,7 @@ from solver.continuation.between import least_between
 from solver.errors import SettingError
 from solver.jit.fourier import Complex
 from solver.modes.corrector import Corrected, ModeState, correct
-from solver.modes.driven.held_amplitude import Held
+from solver.modes.held_amplitude import Held
 from solver.modes.nonlinear_mode import pose
 from solver.modes.records import Recorder
 from solver.results.told import Piece

@@ -23,6 +23,7 @@ _MULTIPLIERS, _FIXED, _ELEMENT = 1.2e-9, 1e-3, 1e-3  # of eigenvalues by size³;
 _CHANGES, _TURNS = 6, 12
 _CLOSED = 0.5  # share of the period that contacts whose load moves are taken to be closed
 _DECOUPLED = 1e-8  # relative size of the commutator of stiffness and damping
+_MOST_COORDINATES = 200  # of a whole structure whose multipliers are computed unasked
 _POWERS = 40  # iterations for the largest eigenvalue
 
 
@@ -107,3 +108,14 @@ def _largest(matrix: Complex) -> float:
             break
         vector /= size
     return size
+
+
+def left_out(scene: Scene, stability: bool | None) -> str:
+    """Return why no multipliers are computed; empty if they are."""
+    if stability is False:
+        return "not asked for"
+    sectors = scene.structure.sector_count if scene.structure.has_sectors else 1
+    size = sectors * len(scene.dofs)
+    if stability is None and size > _MOST_COORDINATES:
+        return f"left out: {size} coordinates take minutes; `stability=True` computes them"
+    return ""

@@ -12,6 +12,7 @@ from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.clock import clock
 from solver.jit.fourier import Complex, Real
+from solver.lab import from_lab
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_counts
 from solver.linear.model import with_inertia
@@ -56,9 +57,10 @@ def stability(
     """
     check_converged(solution)
     if solution.scene.rigid_contact is not None:
-        from solver.response.exact.answer import stability_exactly  # loaded by such scenes alone
-
-        return stability_exactly(solution.scene, solution.frequency_hz)
+        found: Stability = from_lab("proofs.exact.answer:stability_exactly")(
+            solution.scene, solution.frequency_hz
+        )
+        return found
     motions = tuple(np.array(contact.motions) for contact in solution.contacts)
     return motions_stability(
         solution.scene, solution.frequency_hz, motions, on_progress=on_progress, should_stop=should_stop

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from solver.continuation.branch import Branch
 from solver.continuation.peaks import Peak
 from solver.errors import SettingError
+from solver.lab import LAB, from_lab, is_there
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_counts
 from solver.response.stability.cost import forecast
@@ -97,9 +98,10 @@ def _without_multipliers(scene: Scene, frequency_hz: float) -> Verdict | None:
 
 
 def _stable_beside(solution: Solution) -> str:
-    """Return the words for the largest stable response of the same frequency."""
-    from solver.response.stability.all_solutions import solve_all
-
+    """Return the words for the largest stable response of the same frequency, where it can be searched."""
+    if not is_there(f"{LAB}.all_solutions"):
+        return ""
+    solve_all = from_lab("all_solutions.all_solutions:solve_all")
     unknowns = (2 * solution.n_harmonics + 1) * int(port_counts(solution.scene).sum())
     parts = iter(range(math.ceil(_PARTS * min((_UNKNOWNS / unknowns) ** 2, 1.0))))
     every = solve_all(

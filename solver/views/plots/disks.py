@@ -135,7 +135,7 @@ def mistuning_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
         shares.set_ylim(0.0, 103.0)
         shares.set_title(f"{answer['scene']}, {factors.size} disks, spread {answer['spread']:g}")
         heights = np.array([np.nan if p is None else p for p in worst["peaks"]]) * unit.per_metre
-        _draw_blades(
+        draw_blades(
             blades, heights, worst["worst_blade"], Measured.of_result(answer).label("highest peak", unit)
         )
         blades.axhline(tuned * unit.per_metre, color=style.INK, linewidth=0.9, linestyle=(0, (5.0, 2.5)))
@@ -146,46 +146,6 @@ def mistuning_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
         )  # fmt: skip
         blades.set_title(f"worst disk, seed {worst['seed']}")
     return page
-
-
-def worst_mistuning_figure(answer: Json, *, ax: Into = None) -> Figure:
-    """The factors of the worst pattern, and the magnifications beside the bounds.
-
-    Of the JSON of `solver.WorstMistuning`, with a worst pattern.
-    """
-    worst = answer["worst"]
-    percent = 100.0 * (np.array(worst["factors"]) - 1.0)
-    with style.styled():
-        page, (blades, bars) = style.figure(8.0, 3.3, columns=2, into=ax)
-        _draw_blades(blades, percent, worst["blade"], f"factor of {', '.join(answer['of'])} − 1 [%]")
-        blades.axhline(0.0, color=style.GREY, linewidth=0.9)
-        blades.set_title(f"{answer['scene']}, worst within ± {100.0 * answer['within']:g} %")
-        _draw_magnifications(bars, answer)
-    return page
-
-
-def _draw_magnifications(axes: Axes, answer: Json) -> None:
-    """Bars of the worst pattern and of the intentional ones, and what they cannot exceed."""
-    rows = [("worst", answer["worst"]["magnification"], None)] + [
-        (one["pattern"], one["disk"]["magnification"], one["worst"] and one["worst"]["magnification"])
-        for one in answer["patterns"]
-    ]
-    places = np.arange(len(rows))
-    for i, (name, alone, on_top) in enumerate(rows):
-        if on_top is not None:
-            axes.bar(i, on_top, color=style.VERMILION, alpha=0.35, width=0.7)
-        axes.bar(i, alone, color=style.VERMILION if name == "worst" else style.SKY, width=0.7)
-    axes.set_title("magnification")
-    for key, words, colour in (("whitehead", "Whitehead", style.INK), ("martel", "Martel", style.GREEN)):
-        if answer[key] is not None and answer[key] < 2.0 * answer["whitehead"]:
-            axes.axhline(answer[key], color=colour, linewidth=0.9, linestyle=(0, (5.0, 2.5)), label=words)
-    axes.axhline(1.0, color=style.GREY, linewidth=0.9)
-    axes.set_xticks(places, [name for name, _, _ in rows])
-    axes.grid(visible=False, axis="x")
-    on_top = any(one is not None for _, _, one in rows)
-    style.label(axes, "pale: with the worst mistuning on top" if on_top else "", "peak / tuned peak")
-    axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])
-    axes.legend(loc="upper right", ncols=2)
 
 
 def blades_figure(heights: Real, what: str, *, ax: Into = None) -> Figure:
@@ -201,11 +161,12 @@ def blades_figure(heights: Real, what: str, *, ax: Into = None) -> Figure:
     highest = int(np.nanargmax(heights)) if known.size else -1
     with style.styled():
         page, (axes,) = style.figure(5.0, 3.3, into=ax)
-        _draw_blades(axes, heights * unit.per_metre, highest, f"{what} [{unit.name}]")
+        draw_blades(axes, heights * unit.per_metre, highest, f"{what} [{unit.name}]")
     return page
 
 
-def _draw_blades(axes: Axes, heights: Real, highest: int, words: str) -> None:
+def draw_blades(axes: Axes, heights: Real, highest: int, words: str) -> None:
+    """Draw a bar for every blade, the highest one apart; `words` say what is drawn, with its unit."""
     colors = [style.VERMILION if i == highest else style.SKY for i in range(heights.size)]
     axes.bar(np.arange(heights.size), heights, color=colors, width=0.7)
     axes.grid(visible=False, axis="x")

@@ -15,7 +15,6 @@ Json = Mapping[str, Any]
 Pairs = list[tuple[str, str]]
 
 ROUNDING = 1e-14  # share of the largest harmonic that may be left where there is none
-_ACCURACY_COLUMNS = ("", "harmonics", "contact forces", "max|x|", "error", "ms", "iterations")
 _SOLUTION_COLUMNS = ("half peak to peak", "mean", "", "largest multiplier", "found by", "residual forces")
 _EFFECT_COLUMNS = ("used", "effect", "reason")
 
@@ -192,30 +191,6 @@ def sure_of(found: Json) -> Pairs:
     return pairs
 
 
-def accuracy(found: Json) -> Iterator[Block]:
-    """Error against time, the rows nothing beats marked."""
-    size = found["reference"]
-    rows = [
-        (
-            "*" if row["pareto"] else "",
-            str(row["harmonics"] or ""),
-            row["evaluator"] if row["samples"] == 0 else f"{row['samples']} samples",
-            units.length(row["max_abs"]),
-            f"{row['error'] / size:.1e}" if size > 0.0 else "",
-            f"{row['milliseconds']:.3g}",
-            str(row["iterations"]),
-        )
-        for row in found["rows"]
-    ]
-    title = f"{found['scene']} at {found['frequency_hz']:.6g} Hz: {units.length(size)}"
-    if found["reference_error"] is not None:
-        by = found["reference_harmonics"]
-        way = f"with {by} harmonics" if by else "exact"
-        title += f" {way}, to {units.length(found['reference_error'])}"
-    yield ResultTable(title, _ACCURACY_COLUMNS, rows)
-    yield Summary("", [("*", "nothing else here is both as accurate and as fast")])
-
-
 def march(found: Json) -> Iterator[Block]:
     """What a time march came to."""
     pairs = _amplitudes(found)
@@ -245,90 +220,6 @@ def transient(found: Json) -> Iterator[Block]:
     yield Summary(f"{found['scene']} from {begin} to {end} Hz", pairs)
 
 
-def _reached(hours: float) -> str:
-    return f"reached after {units.number(hours)} h" if hours > 0.0 else "exceeded from the beginning"
-
-
-def wear_life(found: Json) -> Iterator[Block]:
-    """What contacts lose over hours, and what the response comes to."""
-    hours, amplitude, pairs = found["hours"], found["amplitude"], _chosen(found.get("chosen"))
-    where = "at the highest peak" if found["at_peak"] else "at given frequencies"
-    if hours:
-        for name, at in (("max|x| at the beginning", 0), (f"after {units.number(hours[-1])} h", -1)):
-            pairs.append(
-                (name, f"{units.length(amplitude[at])} at {units.number(found['frequency_hz'][at])} Hz")
-            )
-        pairs.append(
-            ("largest", f"{units.length(found['highest'])} after {units.number(found['highest_hours'])} h")
-        )
-    if found["limit"] is not None:
-        met = found["hours_to_limit"]
-        said = "not reached" if met is None else _reached(met)
-        pairs.append((f"limit {units.length(found['limit'])}", said))
-    used, met = found.get("used", ()), found.get("hours_to_margin")
-    if met is not None or any(one is not None for one in used):
-        # Beside a margin that is known, null is a mean stress that leaves nothing.
-        first, last = ("infinite" if one is None else units.number(one, 4) for one in (used[0], used[-1]))
-        share = f"{first} at the beginning, {last} at the end"
-        pairs.append(("of the stress allowed", share))
-        pairs.append(("margin 1", "kept" if met is None else _reached(met)))
-    for one in found["switches"]:
-        pairs.append(("another peak is highest", f"from {units.number(one)} h on"))
-    if found["ended_by"]:
-        pairs.append(("ended by", found["ended_by"]))
-    pairs.append(("steps", f"{found['steps']}, {found['responses']} responses"))
-    pairs.append(("time", units.duration(found["seconds"])))
-    yield Summary(f"{found['scene']}, wear {where}", pairs)
-    if hours:
-        of_each = (found[key] for key in ("contacts", "depths", "loads", "power"))
-        rows = [
-            (
-                name, units.length(depth[-1]), _force(load[0]), _force(load[-1]), f"{power[0]:.4g} W",
-                f"{power[-1]:.4g} W",
-            )
-            for name, depth, load, power in zip(*of_each, strict=True)
-        ]  # fmt: skip
-        heads = ("contact", "depth", "load at first", "at last", "power at first", "at last")
-        yield ResultTable("Contacts", heads, rows)
-    if found["paths"]:
-        columns = [found[f"{name}_slopes"] for name in ("end", "highest", "limit", "margin")]
-        slopes = [
-            (path, *("" if one is None else f"{one:.6g}" for one in each))
-            for path, *each in zip(found["paths"], *columns, strict=True)
-        ]
-        by = ("by", "of the last amplitude", "of the largest", "of the time to the limit", "to margin 1")
-        yield ResultTable("Derivatives", by, slopes)
-
-
-def _chosen(found: Json | None) -> list[tuple[str, str]]:
-    """What was chosen for the life, and the worst amplitude with it."""
-    if found is None:
-        return []
-    if found["at"] is None:
-        return [("chosen", found["status"])]
-    worst = f"{units.length(found['worst'])} at worst, {units.length(found['first'])} when new"
-    return [
-        (found["parameter"], f"{units.number(found['at'], 6)} {found['unit']}".rstrip()),
-        ("chosen", worst),
-    ]
-
-
-def least_worn_peak(found: Json) -> Iterator[Block]:
-    """The best value of a parameter for contacts that wear."""
-    pairs: Pairs = []
-    if found["at"] is not None:
-        pairs.append(("best", f"{found['parameter']} = {parameter(found['parameter'], found['at'])}"))
-        when = f"after {units.number(found['worst_hours'])} h"
-        pairs.append(("worst amplitude", f"{units.length(found['worst'])} {when}"))
-        pairs.append(("before anything is worn", units.length(found["first"])))
-    pairs += [("lives looked at", str(len(found["looked_at"]))), ("time", units.duration(found["seconds"]))]
-    yield Summary(f"{found['scene']}, least amplitude of worn contacts", pairs)
-
-
-def _force(value: float | None) -> str:
-    return "" if value is None else f"{units.number(value)} N"
-
-
 def _amplitudes(found: Json) -> Pairs:
     known = {key: found[key] for key in WORDS if found[key] is not None}
     show = units.length_unit(max((abs(value) for value in known.values()), default=0.0)).show
@@ -349,43 +240,3 @@ def _band(found: Json) -> str:
     above = f"{units.number(found['band_hz'])} Hz above {units.length(found['band_limit'])}"
     intervals = [f"{low:.6g} to {high:.6g}" for low, high in found["band_intervals_hz"]]
     return f"{above}: {', '.join(intervals)}" if intervals else above
-
-
-def _torus_curve(found: Json) -> Iterator[Block]:
-    """The responses to two base frequencies over the first of them."""
-    keys = ("max_abs", "rms", "first_amplitude", "second_amplitude", "error_estimate")
-    rows = []
-    for i, hertz in enumerate(found["frequency_hz"]):
-        sizes = ["" if found[key][i] is None else units.length(found[key][i]) for key in keys]
-        note = "repeats" if found["repeats"][i] else "" if found["known"][i] else "not known well"
-        rows.append((units.number(hertz), *sizes, note))
-    heads = ("frequency [Hz]", "max|x|", "root mean square", "at the first", "at the second", "± error", "")
-    yield ResultTable(f"{found['scene']} with {units.number(found['second_hz'])} Hz", heads, rows)
-    yield Summary("", [("time", units.duration(found["seconds"]))])
-
-
-def quasi_periodic(found: Json) -> Iterator[Block]:
-    """What the response to two base frequencies is, or a curve of such responses."""
-    if isinstance(found["frequency_hz"], list):
-        yield from _torus_curve(found)
-        return
-    first, second = units.number(found["frequency_hz"]), units.number(found["second_hz"])
-    pairs = []
-    if found["max_abs"] is not None:
-        pairs += [
-            ("max|x|", units.length(found["max_abs"])),
-            ("half peak to peak", units.length(found["half_peak_to_peak"])),
-            ("root mean square", units.length(found["rms"])),
-            (f"amplitude at {first} Hz", units.length(found["first_amplitude"])),
-            (f"amplitude at {second} Hz", units.length(found["second_amplitude"])),
-        ]
-        if found["error_estimate"] is not None:
-            pairs.append(
-                ("estimated error", f"{found['error_estimate'] / found['half_peak_to_peak']:.1e} of it")
-            )
-        between = " and ".join(f"{p} : {q}" for p, q in found["turns"])
-        pairs.append(("repeats after turns" if found["repeats"] else "between turns", between))
-    pairs += [(name, state) for name, state in found["contacts"].items()]
-    pairs += [("flags", ", ".join(found["flags"]))] if found["flags"] else []
-    pairs.append(("time", units.duration(found["seconds"])))
-    yield Summary(f"{found['scene']} at {first} and {second} Hz", pairs)

@@ -16,7 +16,7 @@ from solver.balance.workspace import Workspace
 from solver.contacts.kernels import stick_slip_events as events
 from solver.contacts.kernels.coulomb.aft import sampled_force
 from solver.jit import fourier
-from solver.studies.convergence import sampled
+from stickslip.lab.accuracy.accuracy_study import sampled
 
 REFERENCE = json.loads((Path(__file__).parent.parent.parent / "data" / "contact_force.json").read_text())
 NAMES = [name for name in REFERENCE if name != "about"]

@@ -28,7 +28,7 @@ from solver.matrices.sectors.elimination import elimination, rotation
 from solver.matrices.sectors.loading import boundaries
 from solver.matrices.sectors.pairing import groups, paired
 from solver.matrices.sectors.reduction import diameters_met, reduce_sector
-from solver.studies.patterns.linear_disk import Contacts, linear_disk, with_factors
+from stickslip.lab.worst_mistuning.linear_disk import Contacts, linear_disk, with_factors
 
 ROOT = Path(__file__).resolve().parents[3]
 SECTORS = 6

@@ -14,8 +14,8 @@ from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import BranchStatus
 from solver.linear.modal import undamped_resonance
-from solver.response.quasi_periodic_result import QuasiPeriodicStatus
 from solver.studies.peaks.seeds import fitted
+from stickslip.lab.quasi_periodic.quasi_periodic_result import QuasiPeriodicStatus
 
 
 def scene(**structure: Any) -> Scene:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver import Scene, march, solve, sweep
-from solver.response.exact.answer import solve_exactly
+from stickslip.lab.proofs.exact.answer import solve_exactly
 
 FEWEST_COVERED, FEWEST_USEFUL, USEFUL = 0.95, 0.9, 100.0
 ROUNDING = 1e-9  # of the amplitude

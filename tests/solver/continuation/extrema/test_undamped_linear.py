@@ -16,8 +16,8 @@ from solver.linear.assembly import linear_model
 from solver.linear.condensation import force_amplitudes
 from solver.response.solution import SolutionStatus
 from solver.studies.blades import blade_peaks
-from solver.studies.patterns.worst import WorstSearch, worst_mistuning
-from solver.studies.patterns.worst_result import WorstMistuningStatus
+from stickslip.lab.worst_mistuning.worst import WorstSearch, worst_mistuning
+from stickslip.lab.worst_mistuning.worst_result import WorstMistuningStatus
 
 RATIOS = (0.0, 1e-12)
 

@@ -1,1 +1,0 @@
-"""Periodic responses with proofs: certificates, and the checker that stands alone."""

@@ -1,0 +1,51 @@
+"""The lab as seen from below: what few ask stands there, a folder a capability, and is named by its place.
+
+`stickslip.lab` lies above everything else, so nothing here or above may import it. Registries, stubs and the
+few calls that lead into it name it as text. Where a folder is taken out, so are the names, kinds and commands
+it gave.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+from solver.errors import SolverError
+
+LAB = "stickslip.lab"
+
+
+class MissingRoomError(SolverError):
+    """What stands in a folder of the lab is needed, and the folder is not there."""
+
+    def __init__(self, room: str) -> None:
+        super().__init__(f"this needs {LAB}.{room}, which is not installed")
+
+
+@cache
+def rooms() -> frozenset[str]:
+    """The folders of the lab that are there; nothing is imported to know it."""
+    lab = os.path.join(os.path.dirname(os.path.dirname(__file__)), *LAB.split("."))
+    return frozenset(os.listdir(lab) if os.path.isdir(lab) else ())
+
+
+def is_there(module: str) -> bool:
+    """Whether a module can be had, as far as the lab goes."""
+    return not module.startswith(f"{LAB}.") or module.split(".")[2] in rooms()
+
+
+def from_lab(place: str) -> Any:
+    """Load what stands in the lab at a place, ``room.module:name``, or ``room.module`` itself.
+
+    Raises
+    ------
+    MissingRoomError
+        The room is not there.
+    """
+    module, _, name = place.partition(":")
+    if not is_there(f"{LAB}.{module}"):
+        raise MissingRoomError(module.partition(".")[0])
+    found = import_module(f"{LAB}.{module}")
+    return getattr(found, name) if name else found

@@ -1,1 +1,0 @@
-"""Wear over life: depths of the contacts, loads and response over hours."""

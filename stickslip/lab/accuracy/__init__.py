@@ -1,0 +1,1 @@
+"""What accuracy costs in time: a response with more and more harmonics."""

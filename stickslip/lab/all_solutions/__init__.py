@@ -1,0 +1,1 @@
+"""All the responses there are at one frequency, as far as a search finds them."""

@@ -1,0 +1,1 @@
+"""Designs among the dampers of a catalogue."""

@@ -1,0 +1,166 @@
+"""Responses over the frequency at a held amplitude, as rigs with amplitude control run: `held_amplitude`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from solver.balance.speed_line import check_no_line
+from solver.errors import SettingError
+from solver.jit.clock import clock
+from solver.jit.fourier import Real
+from solver.modes.corrector import Corrected
+from solver.modes.curve import FollowedCurve, follow
+from solver.modes.held_amplitude import Held, first_held, least_force
+from solver.response.stability.cost import left_out
+from solver.modes.nonlinear_mode import LEAST, MOST_POINTS, pose
+from solver.modes.records import PointRecord, Recorder, Wider, last_unknowns, told_of
+from solver.modes.results import HeldAmplitude, HeldStatus, LeastForce
+from solver.response.stability.floquet import motions_stability
+from solver.scene.parameter_paths import check_frequency
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
+
+LEVEL = "excitation.amplitude"
+_FAINT = 1e-12  # share of a motion in phase with the force below which the amplitude has no force to hold it
+_SAME = 1e-9  # relative distance of an end of the range within which a point is at it
+
+
+def held_amplitude(
+    scene: Scene, amplitude: float, *, start: float | None = None, stop: float | None = None,
+    dof: str | None = None, harmonics: int = 11, errors: bool = True, stability: bool | None = None,
+    most_points: int = MOST_POINTS, on_progress: Callable[[float, int], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> HeldAmplitude:  # fmt: skip
+    """Follow the responses whose amplitude at one DOF is held, over the frequency: which force they take.
+
+    Every point is a response to the scene's excitation times a factor, exact but for the harmonics left out.
+
+    Parameters
+    ----------
+    scene : what vibrates; the size of its excitation does not matter.
+    amplitude : of harmonic 1 of the DOF [m].
+    start, stop : frequencies [Hz], the scene's band if left out; from low to high.
+    dof : the DOF; that of the scene's `observe` if left out.
+    harmonics : highest harmonic kept.
+    errors : estimate what more harmonics would change, for about as much time again.
+    stability : Floquet multipliers of every point; of a disk they are of all its sectors. Left out, they are
+        computed of structures of at most 200 coordinates: of more they take minutes.
+    most_points : of the curve.
+    on_progress : is told the share of the range that is done and the number of points.
+    should_stop : is asked at every point whether to stop there.
+
+    Raises
+    ------
+    SettingError
+        An amplitude, range, DOF or number of harmonics that cannot be; an excitation that is not of harmonic
+        1 alone, does not move the DOF, or follows the speed along an engine-order line.
+    """
+    begun = clock()
+    scene = _checked(scene, amplitude, dof)
+    low, high = _range(scene, start, stop)
+    problem = pose(scene, 1, None, harmonics, kind=Held)
+    equations = cast(Held, problem.equations)
+    equations.target = float(amplitude)
+    _check_moves(equations, scene, 2.0 * math.pi * low)
+    first = first_held(equations, problem.rest, 2.0 * math.pi * low)
+    last, least = math.log(2.0 * math.pi * high), math.log(2.0 * math.pi * low * (1.0 - _SAME))
+    curve = follow(
+        equations, first, last, turns=False, most_points=most_points, least_share=0.0, least=least,
+        done=lambda at: (math.exp(at) / (2.0 * math.pi) - low) / (high - low), on_progress=on_progress,
+        should_stop=should_stop,
+    )  # fmt: skip
+    unknown = left_out(scene, stability)
+    return _collect(equations, curve, errors=errors, unknown=unknown, begun=begun)
+
+
+def _checked(scene: Scene, amplitude: float, dof: str | None) -> Scene:
+    """Return the scene that observes the DOF."""
+    number = isinstance(amplitude, (int, float)) and not isinstance(amplitude, bool)
+    if not number or not LEAST <= amplitude <= 1.0 / LEAST:
+        wanted = f"must be an amplitude > 0, from {LEAST:g} to {1.0 / LEAST:g} m"
+        raise SettingError("amplitude", amplitude, wanted)
+    check_no_line(scene)
+    if any(force.harmonic != 1 for force in scene.excitation):
+        wanted = "must be of harmonic 1 alone: its size is what holds the amplitude"
+        raise SettingError("excitation", [force.place for force in scene.excitation], wanted)
+    if dof is None:
+        return scene
+    if dof not in scene.dofs:
+        raise SettingError("dof", dof, f"must be one of {', '.join(scene.dofs)}")
+    return scene.model_copy(update={"observe": scene.observe.model_copy(update={"dof": dof})})
+
+
+def _range(scene: Scene, start: float | None, stop: float | None) -> tuple[float, float]:
+    """Return the frequencies [Hz]."""
+    low, high = (
+        check_frequency(name, scene.observe.band[i] if end is None else end)
+        for i, (name, end) in enumerate((("start", start), ("stop", stop)))
+    )
+    if not low < high:
+        raise SettingError("stop", high, f"must be above the start {low!r}")
+    return low, high
+
+
+def _check_moves(equations: Held, scene: Scene, omega: float) -> None:
+    """Raise SettingError where the excitation does not move the DOF."""
+    s = equations.structure
+    dynamics = s.at(omega, 0.0, s.nearest(omega, 0.0))
+    x = dynamics.solve(equations.by_force())[s.first]
+    seen = abs(complex(np.sum(s.observe[s.first] * x)))
+    if not seen > _FAINT * float(np.linalg.norm(s.observe[s.first]) * np.linalg.norm(x)):
+        wanted = f"must move {scene.observe.dof!r}: no force of it holds an amplitude there"
+        raise SettingError("excitation", [force.place for force in scene.excitation], wanted)
+
+
+def _collect(
+    equations: Held, curve: FollowedCurve, *, errors: bool, unknown: str, begun: float
+) -> HeldAmplitude:
+    """Return the result of a curve."""
+    balance, points = equations.balance, curve.points
+    recorder = Recorder(equations, turns=False)
+    rows = [recorder.of(point) for point in points]
+    observed = np.array([row.observed for row in rows]).reshape(-1, 2 * balance.highest_harmonic + 1)
+    error = np.full(len(points), math.nan)
+    if errors and points:
+        wider = Wider(equations)
+        error = np.array([wider.estimate(point)[1] for point in points])
+    frequency, z = last_unknowns(points)
+    stable, unknown = _stable(equations, frequency, z, rows, unknown)
+    return HeldAmplitude(
+        **told_of(equations, points, rows, begun), held=equations.target, n_harmonics=balance.n_harmonics,
+        status=HeldStatus[curve.end.name], frequency_hz=frequency, excitation=z * equations.unit,
+        excitation_error=error * equations.unit,
+        phase_deg=np.degrees(np.angle(observed[:, 1] - 1j * observed[:, 2])),
+        stable=stable, unknown=unknown, observed=observed,
+        least=_force_of(equations, least_force(equations, points)),
+    )  # fmt: skip
+
+
+def _force_of(equations: Held, point: Corrected | None) -> LeastForce:
+    """Return the factor on the excitation and the frequency [Hz]; NaN without a point."""
+    if point is None:
+        return LeastForce(math.nan, math.nan)
+    return LeastForce(float(point.state.y[-1]) * equations.unit, float(point.state.y[-2]) / (2.0 * math.pi))
+
+
+def _stable(
+    equations: Held, frequency: Real, z: Real, rows: list[PointRecord], unknown: str
+) -> tuple[tuple[bool | None, ...], str]:
+    """Return whether each point is stable while its force is held, and why that is not known."""
+    if unknown:
+        return (None,) * len(rows), unknown
+    scene, found = equations.balance.scene, []
+    ends = np.cumsum([len(contact.end_keys) for contact in scene.contacts])[:-1]
+    for row, hertz, factor in zip(rows, frequency.tolist(), z.tolist(), strict=True):
+        there = scene.with_values({LEVEL: factor * equations.unit * scene.value(LEVEL)})
+        motions = tuple(np.split(row.motions, ends))
+        try:
+            found.append(motions_stability(there, hertz, motions).stable)
+        except SettingError as error:  # a law or a term without a motion in time
+            return (None,) * len(rows), str(error)
+    return tuple(found), ""

@@ -1,0 +1,1 @@
+"""Doors to other programs: answers as functions with exact derivatives, equations of motion, FMU, MATLAB."""

@@ -1,0 +1,1 @@
+"""Limit cycles: where friction takes out what the flow, or a negative damping, puts in."""

@@ -1,0 +1,1 @@
+"""Periodic responses with proofs: certificates, the checker, exact orbits, rigid friction."""

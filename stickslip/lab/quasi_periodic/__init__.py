@@ -1,0 +1,1 @@
+"""Responses to excitations of two frequencies without a common period."""

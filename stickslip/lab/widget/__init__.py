@@ -1,0 +1,1 @@
+"""An explorer of designs in a notebook."""

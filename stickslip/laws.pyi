@@ -1,0 +1,5 @@
+from solver import (
+    LawParameter as LawParameter,
+    register_law as register_law,
+    tensor_springs as tensor_springs,
+)
