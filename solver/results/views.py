@@ -59,20 +59,23 @@ class Views:
     figure: str = ""
     dataset: str = "described"
 
-    def call(self, what: str, result: Any, *arguments: Any, **options: Any) -> Any:
-        """Show a result: `what` is ``told``, ``to_dataset`` or ``figure``."""
+    def place(self, what: str) -> str:
+        """Where the function stands that makes ``told``, ``to_dataset`` or ``figure``: ``module:name``."""
         of_json, of_result, name = {
             "told": ("tables.", "summary:", self.told),
             "to_dataset": ("", "to_dataset:", self.dataset),
             "figure": ("plots.", "plots.figures:", self.figure),
         }[what]
-        if self.package.startswith(LAB) and what != "to_dataset":
-            module = "tables" if what == "told" else "pictures"
-            return on_demand(f"{self.package}.{module}:{name}")(result.to_json(), *arguments, **options)
-        if ":" in name:
-            return on_demand(f"{self.package}.{of_json}{name}")(result.to_json(), *arguments, **options)
-        package = "solver.views" if self.package.startswith(LAB) else self.package
-        return on_demand(f"{package}.{of_result}{name}")(result, *arguments, **options)
+        if not self.package.startswith(LAB):
+            return f"{self.package}.{of_json if ':' in name else of_result}{name}"
+        of_json = {"told": "tables", "figure": "pictures"}.get(what, "")
+        return f"{self.package}.{of_json}:{name}" if of_json else f"solver.views.{of_result}{name}"
+
+    def call(self, what: str, result: Any, *arguments: Any, **options: Any) -> Any:
+        """Show a result: `what` is ``told``, ``to_dataset`` or ``figure``."""
+        place = self.place(what)
+        of_result = place.rpartition(".")[2].partition(":")[0] in ("summary", "to_dataset", "figures")
+        return on_demand(place)(result if of_result else result.to_json(), *arguments, **options)
 
 
 def on_demand(place: str) -> Callable[..., Any]:

@@ -29,7 +29,11 @@ _counted: Counter[str] = Counter()
 def kernels_called_by_tests() -> dict[Path, set[str]]:
     """The kernels of the solver that each file of tests imports by name, as ``module:name``."""
     found: dict[Path, set[str]] = {}
-    for path in [*ROOT.glob("tests/solver/**/test_*.py"), *ROOT.glob("tests/cases/*.py")]:
+    for path in [
+        *ROOT.glob("tests/solver/**/test_*.py"),
+        *ROOT.glob("stickslip/lab/*/tests/*.py"),
+        *ROOT.glob("tests/cases/*.py"),
+    ]:
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.ImportFrom) and node.module and _holds_kernels(node.module):
                 names = {f"{node.module}:{one.name}" for one in node.names}
@@ -38,7 +42,9 @@ def kernels_called_by_tests() -> dict[Path, set[str]]:
 
 
 def _holds_kernels(module: str) -> bool:
-    return module.startswith("solver.") and not {"kernels", "jit"}.isdisjoint(module.split("."))
+    return module.startswith(("solver.", "stickslip.lab.")) and not {"kernels", "jit"}.isdisjoint(
+        module.split(".")
+    )
 
 
 def _kernels_of(module: str) -> set[str]:
@@ -71,7 +77,7 @@ def _recorder(kernel: Any) -> Callable[..., Any]:
     name = f"{kernel.__module__}:{kernel.__name__}"
 
     def called(*arguments: Any) -> Any:
-        if _counted[name] >= MOST or not kernel.__module__.startswith("solver."):
+        if _counted[name] >= MOST or not _holds_kernels(kernel.__module__):
             return kernel(*arguments)
         before = _kept(arguments)
         result = kernel(*arguments)

@@ -147,3 +147,19 @@ def critically_damped() -> Scene:
             break
         low, high = (low, middle) if creeps(middle) else (middle, high)
     return joined_by_a_damper(high)
+
+
+def duffing(a3: float = 1.0, band: tuple[float, float] = (0.2, 0.35)) -> Scene:
+    """One mass whose spring hardens by its cube, driven far beyond its resonance."""
+    return Scene.from_dict(
+        {
+            "name": "duffing",
+            "structure": {
+                "kind": "lumped", "masses": {"x": 1.0},
+                "springs": [{"between": ["x", "ground"], "k": 1.0, "c": 0.2}],
+            },
+            "contacts": [{"name": "c", "law": "polynomial", "between": ["x", "ground"], "a3": a3}],
+            "excitation": {"dof": "x", "amplitude": 15.0},
+            "observe": {"dof": "x", "band": list(band)},
+        }
+    )  # fmt: skip

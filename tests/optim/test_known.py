@@ -1,9 +1,7 @@
 """Known errors reach the user: every result made of responses says how well its numbers are known."""
 
-import importlib
 import json
 import math
-import pkgutil
 import re
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
@@ -13,9 +11,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from every_module import every_module
 
 import optim
 import solver
+import stickslip.lab
 from optim.results.design import DesignStatus
 from optim.views.tables.robust import robust
 from service.cli import main
@@ -36,10 +36,7 @@ OWN_WORDS = {"Branch", "AccuracyStudy"}
 
 def _classes() -> list[type[Any]]:
     """Every dataclass of the solver and of designs, wherever it stands."""
-    for package in (solver, optim):
-        for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
-            if ".kernels" not in module.name and ".plots" not in module.name:
-                importlib.import_module(module.name)
+    assert list(every_module(solver, optim, stickslip.lab))
     found, ahead = set[type[Any]](), [Shown]
     while ahead:
         one = ahead.pop()

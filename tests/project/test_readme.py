@@ -314,7 +314,7 @@ def known(path: str) -> bool:
 
 @cache
 def names_of_tests() -> set[str]:
-    files = (ROOT / "tests").rglob("test_*.py")
+    files = [*(ROOT / "tests").rglob("test_*.py"), *ROOT.glob("stickslip/lab/*/tests/test_*.py")]
     return {name for file in files for name in re.findall(r"def (test_\w+)\(", file.read_text("utf-8"))}
 
 
@@ -324,7 +324,7 @@ def test_modules_and_tests_that_a_page_names_exist(page: Path) -> None:
     paths = re.findall(r"`((?:stickslip|solver|optim|service)(?:\.[a-zA-Z_]\w*)+)(?=[(`\[])", text)
     assert [path for path in paths if path not in NO_MODULES and not known(path)] == []
     assert set(re.findall(r"`(test_\w+)`", text)) <= names_of_tests()
-    files = re.findall(r"`((?:tests|benchmarks|deploy|docs)/[\w/.-]+)`", text)
+    files = re.findall(r"`((?:tests|benchmarks|deploy|docs|stickslip)/[\w/.-]+)`", text)
     assert [file for file in files if not (ROOT / file).exists()] == []
 
 

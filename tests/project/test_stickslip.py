@@ -5,13 +5,14 @@ import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
-from pkgutil import walk_packages
 
 import pytest
+from every_module import every_module
 
 import optim
 import solver
 import stickslip
+import stickslip.lab
 from service.client.client import Client
 from service.errors import ServiceProblem
 from service.jobs.kinds import studies
@@ -29,7 +30,7 @@ SUBJECTS = sorted(path.stem for path in (ROOT / "stickslip").glob("[!_]*.py") if
 
 def passed_on(subject: str) -> set[str]:
     """The names a subject gives."""
-    return {name for name in vars(import_module(f"stickslip.{subject}")) if not name.startswith("_")}
+    return set(import_module(f"stickslip.{subject}").__all__)
 
 
 def test_every_public_name_is_at_the_top_or_in_one_subject() -> None:
@@ -47,7 +48,7 @@ def test_every_name_is_that_of_its_home() -> None:
     for home in (solver, optim):
         for name in home.__all__:
             given = [stickslip, *(getattr(stickslip, subject) for subject in SUBJECTS)]
-            assert {getattr(one, name) for one in given if name in vars(one)} <= {getattr(home, name)}
+            assert {getattr(one, name) for one in given if name in one.__all__} <= {getattr(home, name)}
     assert stickslip.Client is Client
     assert stickslip.errors.ServiceProblem is ServiceProblem
 
@@ -63,7 +64,7 @@ def test_the_names_of_before_lead_to_their_subject_and_say_so() -> None:
 @pytest.mark.parametrize("door", sorted(DOORS))
 def test_a_door_says_what_it_has(door: str) -> None:
     module = pytest.importorskip(f"stickslip.{door}", exc_type=solver.SolverError)
-    names = {name: value for name, value in vars(module).items() if not name.startswith("_")}
+    names = {name: getattr(module, name) for name in module.__all__}
     assert DOORS[door] <= set(names)
     assert [name for name, value in names.items() if not value.__doc__] == []
 
@@ -119,11 +120,7 @@ def test_errors_and_scenes_load_no_kernels() -> None:
 
 def test_every_result_is_shown_by_functions_that_are_there() -> None:
     """`Views` names them as text, which no checker follows when they move."""
-    modules = [
-        import_module(found.name)
-        for package in (solver, optim)
-        for found in walk_packages(package.__path__, f"{package.__name__}.")
-    ]
+    modules = every_module(solver, optim, stickslip.lab)
     views = {
         each.VIEWS
         for module in modules
@@ -132,12 +129,9 @@ def test_every_result_is_shown_by_functions_that_are_there() -> None:
     }
     assert len(views) > 15
     for view in views:
-        figure = view.figure if ":" in view.figure else f"figures:{view.figure}"
-        told = f"tables.{view.told}" if ":" in view.told else f"summary:{view.told}"
-        places = [told, f"to_dataset:{view.dataset}"]
-        for place in [*places, *([f"plots.{figure}"] if view.figure else [])]:
-            assert callable(on_demand(f"{view.package}.{place}"))
-    shown = {f"{view.package}.tables.{view.told}" for view in views}
+        for what in ("told", "to_dataset", *(["figure"] if view.figure else [])):
+            assert callable(on_demand(view.place(what)))
+    shown = {view.place("told") for view in views}
     assert {study.TOLD for study in studies().values()} <= shown, "said by a study and by its result"
 
 

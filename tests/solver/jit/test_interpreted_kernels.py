@@ -142,7 +142,7 @@ def test_every_kernel_called_by_a_test_is_the_same(tmp_path: Path) -> None:
     called = kernels_called_by_tests()
     cases = {path.stem for path in called if path.parent.name == "cases"}
     files = [
-        path for path in ROOT.glob("tests/solver/**/test_*.py")
+        path for path in (*ROOT.glob("tests/solver/**/test_*.py"), *ROOT.glob("stickslip/lab/*/tests/*.py"))
         if path in called or any(f"from {name} import" in path.read_text("utf-8") for name in cases)
         if path != Path(__file__)
     ]  # fmt: skip

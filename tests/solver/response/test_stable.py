@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 from moving_scenes import moving_scene
-from scene_cases import bladed_disk, two_dof
-from test_all_solutions import duffing
+from scene_cases import bladed_disk, duffing, two_dof
 
 import optim
 from solver import Scene, march, plan, solve, solve_all, sweep

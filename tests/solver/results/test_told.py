@@ -8,16 +8,16 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
-from importlib import import_module
-from pkgutil import walk_packages
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 import pytest
 from each import each
+from every_module import every_module
 
 import optim
 import solver
+import stickslip.lab
 from service.jobs.common.results import result_model
 from solver.arrays import FloatOrNaN, Real
 from solver.results.told import Piece, Told, json_keys, json_value
@@ -125,11 +125,10 @@ def test_values_become_json(value: object, wanted: object) -> None:
 
 def _results() -> Iterator[type[Told]]:
     """Every class of results and their parts."""
-    for package in (solver, optim):
-        for module in walk_packages(package.__path__, f"{package.__name__}."):
-            for found in vars(import_module(module.name)).values():
-                if inspect.isclass(found) and issubclass(found, Told) and found.__module__ == module.name:
-                    yield found
+    for module in every_module(solver, optim, stickslip.lab):
+        for found in vars(module).values():
+            if inspect.isclass(found) and issubclass(found, Told) and found.__module__ == module.__name__:
+                yield found
 
 
 @each(set(_results()))

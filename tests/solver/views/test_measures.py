@@ -82,7 +82,7 @@ def test_a_recovered_sum_is_drawn_in_its_unit() -> None:
 def test_nobody_else_makes_such_a_name() -> None:
     """Neither Python nor the page puts `max |` before the name of a DOF by itself."""
     made = re.compile(r"max ?\|\$?\{")
-    for folder in ("solver", "optim", "service"):
+    for folder in ("solver", "optim", "service", "stickslip"):
         for path in (ROOT / folder).rglob("*"):
             if path.suffix not in (".py", ".js") or path.name == "measures.py" or "vendor" in path.parts:
                 continue

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from marched_map import MarchedMap
 from moving_scenes import bending_scene, moving_scene
-from scene_cases import two_dof
+from scene_cases import duffing, two_dof
 
 from solver import (
     Scene,
@@ -25,21 +25,6 @@ from solver import (
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects
 from stickslip.lab.all_solutions.solution_search import SolutionSearch
-
-
-def duffing(a3: float = 1.0, band: tuple[float, float] = (0.2, 0.35)) -> Scene:
-    return Scene.from_dict(
-        {
-            "name": "duffing",
-            "structure": {
-                "kind": "lumped", "masses": {"x": 1.0},
-                "springs": [{"between": ["x", "ground"], "k": 1.0, "c": 0.2}],
-            },
-            "contacts": [{"name": "c", "law": "polynomial", "between": ["x", "ground"], "a3": a3}],
-            "excitation": {"dof": "x", "amplitude": 15.0},
-            "observe": {"dof": "x", "band": list(band)},
-        }
-    )  # fmt: skip
 
 
 def test_seven_responses_of_one_spring_that_bends():
