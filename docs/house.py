@@ -1,7 +1,8 @@
-"""The house in numbers and as a map: ``python docs/house.py [FOLDER]``, ``... --map FILE.svg``.
+"""The house in numbers and as a map: ``docs/house.py [FOLDER]``, ``... --map FILE.svg``, ``... --trips``.
 
 Read from the sources alone, nothing is imported: imports (run at once, run late inside a function, for types
-alone), entries of the folders, lines. The map shows the layers that import-linter keeps, highest first.
+alone), entries of the folders, lines; core (solver, optim, service) and lab apart. The map shows
+the layers that import-linter keeps, highest first. Trips are made: which modules a computation goes through.
 """
 
 from __future__ import annotations
@@ -13,12 +14,16 @@ import sys
 import tokenize
 import tomllib
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from html import escape
 from itertools import pairwise
 from pathlib import Path
+from types import FrameType
+from typing import Any
 
 PACKAGES = ("solver", "optim", "service")
+LAB = "stickslip/lab"
+NUMERICS, SHELL = ("solver", "optim"), ("service", "migrations")
 RUN = 6  # lines of the same shape that make a pair of duplicates
 PARAMETERS = 14
 COMMON = 8  # a run that stands in more places is an idiom, not a duplicate
@@ -29,7 +34,7 @@ class House:
 
     def __init__(self, root: Path) -> None:
         self.root = root
-        found = sorted(path for package in PACKAGES for path in (root / package).rglob("*.py"))
+        found = [path for folder in (*PACKAGES, LAB) for path in _sources(root / folder)]
         self.files = {self._name(path): path for path in found}
         self.trees = {name: ast.parse(path.read_text("utf-8")) for name, path in self.files.items()}
         self.imports: dict[str, dict[str, str]] = {
@@ -96,15 +101,34 @@ class House:
                     found[upper].add(lower)
         return {name: len(inside) for name, inside in sorted(found.items())}
 
-    def lines(self) -> str:
-        """Lines of the sources, in all and of each package."""
-        of = {package: self.lines_below(package) for package in PACKAGES}
-        return f"{sum(of.values())}: {', '.join(f'{package} {count}' for package, count in of.items())}"
+    def lines(self, *folders: str) -> int:
+        """Lines of the sources below folders, tests apart."""
+        return _lines_of(path for folder in folders for path in _sources(self.root / folder))
 
-    def lines_below(self, *folders: str, end: str = "py") -> int:
-        """Lines of the files below folders."""
-        found = [path for folder in folders for path in (self.root / folder).rglob(f"*.{end}")]
-        return sum(len(path.read_text("utf-8").splitlines()) for path in found)
+    def modules(self, *folders: str) -> int:
+        """Modules below folders, `__init__` apart."""
+        found = (path for folder in folders for path in _sources(self.root / folder))
+        return sum(path.stem != "__init__" for path in found)
+
+    def rooms(self) -> dict[str, int]:
+        """Lines of every folder of the lab."""
+        found = sorted(path for path in (self.root / LAB).glob("*/") if (path / "__init__.py").is_file())
+        return {path.name: self.lines(f"{LAB}/{path.name}") for path in found}
+
+    def page(self) -> int:
+        """Lines of the page that are the project's own: scripts, styles, HTML."""
+        page = self.root / "service" / "page"
+        found = (path for end in ("js", "css", "html") for path in page.rglob(f"*.{end}"))
+        return _lines_of(path for path in found if "vendor" not in path.parts)
+
+    def tests(self) -> int:
+        """Lines of the tests, those of the lab among them."""
+        found = [*(self.root / "tests").rglob("*.py"), *(self.root / LAB).glob("*/tests/*.py")]
+        return _lines_of(found)
+
+    def deepest(self) -> int:
+        """Folders below the package that lies deepest."""
+        return max(len(path.relative_to(self.root).parts) - 2 for path in self.files.values())
 
     def twice(self) -> tuple[int, int]:
         """How many names of classes, and of modules, stand for more than one."""
@@ -135,6 +159,11 @@ class House:
         )
         return sum(bool(re.search(rf"\b{word}\b", path.read_text("utf-8"))) for path in texts)
 
+    def reading_mu(self) -> int:
+        """Modules of solver and optim that name the coefficient of friction."""
+        named = (path for package in NUMERICS for path in _sources(self.root / package))
+        return sum(bool(re.search(r"\bmu\b", path.read_text("utf-8"))) for path in named)
+
     def checks_of_laws(self) -> int:
         """``isinstance`` on a class of contact outside the modules of contacts."""
         law = r"\b(AnyContact|\w*Contact|GapSpring|PolynomialSpring)\b"
@@ -160,6 +189,15 @@ class House:
                     if one != other or abs(at - elsewhere) >= RUN:
                         shared[one, other].add(at)
         return len(shared)
+
+
+def _sources(folder: Path) -> list[Path]:
+    """The modules below a folder; tests that stand there are none."""
+    return sorted(p for p in folder.rglob("*.py") if "tests" not in p.relative_to(folder).parts)
+
+
+def _lines_of(paths: Iterable[Path]) -> int:
+    return sum(len(path.read_text("utf-8").splitlines()) for path in paths)
 
 
 def _repeated(names: list[str]) -> int:
@@ -219,15 +257,19 @@ def report(house: House) -> list[tuple[str, str]]:
     every = ("at once", "late", "for types")
     classes, modules = house.twice()
     return [
-        ("modules", str(len(house.files))),
-        ("source lines", house.lines()),
-        ("lines of the page's scripts", str(house.lines_below("service/page/js", end="js"))),
-        ("lines of the tests", str(house.lines_below("tests"))),
+        ("solver + optim: lines, modules", f"{house.lines(*NUMERICS)}, {house.modules(*NUMERICS)}"),
+        ("service + migrations: lines, modules", f"{house.lines(*SHELL)}, {house.modules(*SHELL)}"),
+        ("lab: lines, modules", f"{house.lines(LAB)}, {house.modules(LAB)}"),
+        ("lines of each folder of the lab", ", ".join(f"{name} {n}" for name, n in house.rooms().items())),
+        ("lines of the page", str(house.page())),
+        ("lines of the tests", str(house.tests())),
         ("names of classes twice", str(classes)),
         ("names of modules twice", str(modules)),
         (f"functions with {PARAMETERS} parameters", ", ".join(house.with_many_parameters()) or "none"),
         ("most entries in a folder", ", ".join(f"{name} {entries[name]}" for name in largest)),
+        ("deepest folder below a package", str(house.deepest())),
         ("longest chain of imports", str(house.depth())),
+        ("modules of solver and optim that read mu", str(house.reading_mu())),
         ("modules in circles, imports at once", str(sum(map(len, house.circles("at once"))))),
         ("modules in circles, late ones and those for types too", str(sum(map(len, house.circles(*every))))),
         ("files that name N0", str(house.with_word("N0"))),
@@ -273,9 +315,45 @@ def drawn(root: Path) -> str:
     return "\n".join([head, title, f"<style>{style}</style>", background, *rows, "</svg>", ""])
 
 
+def trip(call: Callable[[], object]) -> tuple[int, int]:
+    """How many modules of the numerics a call goes through, and functions in them."""
+    modules, functions = set[str](), set[tuple[str, str]]()
+
+    def entered(frame: FrameType, event: str, _argument: object) -> None:
+        module = frame.f_globals.get("__name__", "")
+        if event == "call" and module.partition(".")[0] in (*NUMERICS, "stickslip"):
+            modules.add(module)
+            functions.add((module, frame.f_code.co_qualname))
+
+    sys.setprofile(entered)
+    try:
+        call()
+    finally:
+        sys.setprofile(None)
+    return len(modules), len(functions)
+
+
+def trips() -> Iterator[tuple[str, str]]:
+    """What setting up and sweeping the smallest scene goes through, loaded before."""
+    import solver
+    from solver.balance.balance import build
+
+    ways: dict[str, Callable[[Any], object]] = {"build": lambda scene: build(scene), "sweep": solver.sweep}
+    for name, way in ways.items():
+        way(solver.load_scene("two-dof"))  # what is loaded and compiled at first use is no part of the trip
+        scene = solver.load_scene("two-dof")
+        modules, functions = trip(lambda way=way, scene=scene: way(scene))
+        yield f"{name} of two-dof: modules, functions", f"{modules}, {functions}"
+
+
 def main() -> None:
     """Print the measures, or write the map."""
     root = Path(__file__).resolve().parent.parent
+    if sys.argv[1:2] == ["--trips"]:
+        sys.path.insert(0, str(root))
+        for what, value in trips():
+            print(f"{what:55} {value}")
+        return
     if sys.argv[1:2] == ["--map"]:
         Path(sys.argv[2]).write_text(drawn(root), "utf-8")
         return
