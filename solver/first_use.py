@@ -9,20 +9,32 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Mapping
-from functools import wraps
+from functools import cache, wraps
 from importlib import import_module
 from types import FunctionType
 from typing import ParamSpec, TypeVar
 
 from solver.lab import LAB, is_there
 
+_PACKAGES = ("solver", "optim")
+
 _Given = ParamSpec("_Given")
 _Found = TypeVar("_Found")
 
 
 def names_of(package: str, file: str) -> dict[str, str]:
-    """The module of every public name of a package, from the stub beside its ``__init__``."""
-    return names_in(f"{file.rpartition('.')[0]}.pyi", package)
+    """The module of every public name of a package or module, from the stub beside it.
+
+    What another package makes public is that package's: where it has a name no more, nobody has.
+    """
+    found = names_in(f"{file.rpartition('.')[0]}.pyi", package)
+    return {name: home for name, home in found.items() if home not in _PACKAGES or name in _passed_on(home)}
+
+
+@cache
+def _passed_on(package: str) -> Mapping[str, str]:
+    beside = os.path.dirname(os.path.dirname(__file__))
+    return names_in(os.path.join(beside, package, "__init__.pyi"), package)
 
 
 def names_in(file: str, package: str) -> dict[str, str]:

@@ -28,7 +28,7 @@ class MissingRoomError(SolverError):
 def rooms() -> frozenset[str]:
     """The folders of the lab that are there; nothing is imported to know it."""
     lab = os.path.join(os.path.dirname(os.path.dirname(__file__)), *LAB.split("."))
-    return frozenset(os.listdir(lab) if os.path.isdir(lab) else ())
+    return frozenset(name for name in os.listdir(lab) if name.isidentifier() and name[0] != "_")
 
 
 def is_there(module: str) -> bool:

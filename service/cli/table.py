@@ -287,7 +287,7 @@ COMMANDS = {
             "Print what a job computed, or list the stored designs.", keyed=True,
         ),
         CommandEntry(
-            "mcp", "commands.client.jobs.mcp", "Let a language model use a running service.", keyed=True
+            "mcp", "stickslip.lab.mcp.commands.mcp", "Let a language model use a running service.", keyed=True
         ),
         CommandGroup("runs", "Name, find, compare and delete runs of a service.", RUNS),
         CommandGroup("projects", "Gather runs in projects.", PROJECTS),

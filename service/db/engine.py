@@ -28,7 +28,7 @@ from sqlalchemy.exc import DBAPIError, IntegrityError
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool
 
 from service.db import postgresql
-from service.db.array_store import ArrayStore
+from service.db.arrays_outside import array_store
 from service.db.clock import utc_now
 from service.db.lock import FileLock, make_private
 from service.errors import DatabaseError
@@ -207,7 +207,7 @@ class Database:
     seconds : float
         Longest time for a statement, for a lock, for a connection [s].
     arrays : str or None
-        Where large arrays are, if that is outside of the database (see `ArrayStore`).
+        Where large arrays are, if that is outside of the database (see `service.db.arrays_outside`).
     """
 
     def __init__(
@@ -218,7 +218,7 @@ class Database:
         arrays: str | None = None,
     ) -> None:
         self.url = url
-        self.arrays = None if arrays is None else ArrayStore(arrays)
+        self.arrays = array_store(arrays)
         self._seconds = seconds
         self._here = threading.local()
         self._wrote = -math.inf

@@ -301,7 +301,7 @@ class Figure(TableBase):
 class SweepArray(TableBase):
     """One array of a sweep in NumPy's npy format, with the SHA-256 of its bytes.
 
-    One with a `size` is in the store of arrays (`service.db.array_store`), and has no bytes here.
+    One with a `size` is in the store of arrays (`stickslip.lab.stores.array_store`), and has no bytes here.
     """
 
     __tablename__ = "sweep_array"

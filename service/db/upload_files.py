@@ -19,7 +19,6 @@ from pathlib import Path
 
 from sqlalchemy import Connection, delete, insert, select
 
-from service.db.array_store import to_disk
 from service.db.clock import earliest_id
 from service.db.engine import database_path, files_beside, is_sqlite
 from service.db.lock import try_lock
@@ -177,3 +176,14 @@ def _nobodys(folder: Path, before: float) -> bool:
         if held.read():
             return try_lock(held)
     return folder.stat().st_mtime < before
+
+
+def to_disk(path: str | Path) -> None:
+    """Wait until a file, or what a folder names, has reached the disk."""
+    if os.name != "posix":
+        return
+    opened = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(opened)
+    finally:
+        os.close(opened)

@@ -40,6 +40,7 @@ from service.queue.core import SOLVER_VERSION, Service
 from service.queue.health import Probe
 from service.schemas import problems
 from service.settings.settings import Settings, load_settings
+from solver.lab import from_lab
 
 log = logging.getLogger("stickslip.service")
 
@@ -150,14 +151,12 @@ def _guard(app: FastAPI, service: Service) -> None:
 def _offer_login(app: FastAPI, service: Service) -> None:
     """Let people log in at the provider that the settings name."""
     try:
-        from service.auth.login import Login
-        from service.http.routes import login
+        offer = from_lab("oidc.routes:offer")
     except ImportError as error:
         raise ConfigurationError(
             f"`oidc_issuer` (STICKSLIP_OIDC_ISSUER) needs the extra `oidc` of stickslip: {error}"
         ) from error
-    app.state.login = Login(service.settings, service.keys, service.jobs.now)
-    app.include_router(login.router)
+    offer(app, service)
 
 
 def _say_if_nobody_can_come_in(service: Service) -> None:

@@ -1,88 +1,52 @@
-"""OpenTelemetry traces: off unless the setting `traces` is on, and then free of cost but one look at a flag.
+"""Traces: off unless the setting `traces` is on, and then free of cost but one look at a name.
 
-A job carries the trace of the request that handed it in (`traceparent`, W3C Trace Context) through the
-database to the service that takes it and to the process that computes it, each of which adds a span.
+What makes and sends spans stands in the lab. A job carries the trace of the request that handed it in
+(`traceparent`, W3C Trace Context) through the database to the service that takes it and to the process that
+computes it, each of which adds a span.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
-from service.errors import ConfigurationError
+from solver.lab import from_lab
 
-if TYPE_CHECKING:
-    from opentelemetry.context import Context
-    from opentelemetry.trace import Span
+_spans: Any = None  # what makes them, where there are any
 
-_NAME = "stickslip"
-_HEADER = "traceparent"
-_FLUSH_MILLISECONDS = 1000
-_on = False
+
+class Open(Protocol):
+    """A span that began; ended by whoever hears of the end."""
+
+    @property
+    def carried(self) -> str | None:
+        """What a job carries of it."""
+
+    def end(self, **attributes: Any) -> None:
+        """It is over."""
 
 
 def configure(*, on: bool) -> None:
-    """Send the spans of this process where `OTEL_EXPORTER_OTLP_ENDPOINT` says, if they are wanted.
-
-    A program that has a provider of its own keeps it.
+    """Send the spans of this process, if they are wanted.
 
     Raises
     ------
     ConfigurationError
         If the extra `traces` is not installed.
     """
-    global _on
-    _on = False
-    if not on:
-        return
-    try:
-        from opentelemetry import trace
-        from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter
-        from opentelemetry.sdk.resources import Resource
-        from opentelemetry.sdk.trace import TracerProvider
-        from opentelemetry.sdk.trace.export import BatchSpanProcessor
-    except ImportError as error:
-        raise ConfigurationError(
-            f"`traces` (STICKSLIP_TRACES) needs the extra `traces` of stickslip: {error}"
-        ) from error
-    if not isinstance(trace.get_tracer_provider(), TracerProvider):
-        name = os.environ.get("OTEL_SERVICE_NAME", _NAME)
-        provider = TracerProvider(resource=Resource.create({"service.name": name}))
-        provider.add_span_processor(BatchSpanProcessor(OTLPSpanExporter()))
-        trace.set_tracer_provider(provider)
-    _on = True
-
-
-class Open:
-    """A span that began; ended by whoever hears of the end."""
-
-    def __init__(self, span: Span) -> None:
-        self._span = span
-
-    @property
-    def carried(self) -> str | None:
-        """What a job carries of it."""
-        from opentelemetry.trace import set_span_in_context
-
-        return _carried(set_span_in_context(self._span))
-
-    def end(self, **attributes: Any) -> None:
-        """It is over."""
-        self._span.set_attributes(attributes)
-        self._span.end()
+    global _spans
+    _spans = None
+    if on:
+        spans = from_lab("traces.spans")
+        spans.configure()
+        _spans = spans
 
 
 def begin(name: str, carried: str | None, **attributes: Any) -> Open | None:
     """Begin a span below what a job carries; None where there are no traces."""
-    if not _on:
-        return None
-    from opentelemetry import trace
-
-    # A job that carries nothing begins a trace of its own, whatever this thread does for others.
-    context = _context(carried)
-    return Open(trace.get_tracer(_NAME).start_span(name, context=context, attributes=attributes))
+    opened: Open | None = _spans and _spans.begin(name, carried, **attributes)
+    return opened
 
 
 @contextmanager
@@ -98,31 +62,11 @@ def span(name: str, carried: str | None, **attributes: Any) -> Iterator[None]:
 
 def current() -> str | None:
     """What a job is to carry that is handed in by the request under way."""
-    return _carried(None) if _on else None
+    carried: str | None = _spans and _spans.current()
+    return carried
 
 
 def flush() -> None:
     """Send what was not sent yet, if that is quick: the process ends."""
-    if not _on:
-        return
-    from opentelemetry.sdk.trace import TracerProvider
-    from opentelemetry.trace import get_tracer_provider
-
-    provider = get_tracer_provider()
-    if isinstance(provider, TracerProvider):
-        provider.force_flush(_FLUSH_MILLISECONDS)
-
-
-def _context(carried: str | None) -> Context:
-    from opentelemetry.context import Context
-    from opentelemetry.trace.propagation.tracecontext import TraceContextTextMapPropagator
-
-    return TraceContextTextMapPropagator().extract({_HEADER: carried or ""}, Context())
-
-
-def _carried(context: Context | None) -> str | None:
-    from opentelemetry.trace.propagation.tracecontext import TraceContextTextMapPropagator
-
-    found: dict[str, str] = {}
-    TraceContextTextMapPropagator().inject(found, context)
-    return found.get(_HEADER)
+    if _spans is not None:
+        _spans.flush()

@@ -14,6 +14,7 @@ from service.settings.settings import Settings
 from service.workers.base import Executor, ExecutorStatus, Sink, Stopped
 from service.workers.process_limits import UNLIMITED, ProcessLimits
 from service.workers.slot import LentBatch, Slot
+from solver.lab import from_lab
 
 _TEND_SECONDS = 0.1
 
@@ -168,26 +169,9 @@ def executor_of(settings: Settings, registry: Registry) -> Executor:
             limits=limits,
         )
     try:
-        from distributed import Security
-
-        from service.workers.dask import DaskExecutor
+        made: Executor = from_lab("dask.dask_executor:of_settings")(settings, registry, limits)
     except ImportError as error:
         raise ConfigurationError(
             f"`executor` 'dask' needs the extra of that name: pip install 'stickslip[dask]' ({error})"
         ) from error
-    security = None
-    if settings.dask_scheduler.startswith("tls://"):
-        security = Security(
-            tls_ca_file=str(settings.dask_ca_file),
-            tls_client_cert=str(settings.dask_cert_file),
-            tls_client_key=str(settings.dask_key_file),
-            require_encryption=True,
-        )
-    return DaskExecutor(
-        registry,
-        settings.dask_scheduler,
-        security=security,
-        grace_seconds=settings.grace_seconds,
-        pace=settings.pace,
-        limits=limits,
-    )
+    return made

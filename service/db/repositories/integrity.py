@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Connection, Engine, Select, Text, and_, cast, exists, func, select, text
 from sqlalchemy.exc import DBAPIError
 
-from service.db.array_store import ArrayStore
+from service.db.arrays_outside import ArrayStore, array_store
 from service.db.engine import database_name, database_path, is_sqlite, read_engine
 from service.db.models import Job, JobResult, JobState, Project, Result, Run, SweepArray, Upload
 from service.db.repositories.results import whole
@@ -199,7 +199,7 @@ def check(url: str, arrays: str | None = None) -> Findings:
     wrong = off_head(url, "checks")
     if wrong is not None:
         raise WrongRevisionError(wrong)
-    store = None if arrays is None else ArrayStore(arrays)
+    store = array_store(arrays)
     engine = read_engine(url)
     try:
         with engine.begin() as connection:

@@ -28,7 +28,7 @@ from sqlalchemy import (
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import aliased
 
-from service.db.array_store import ArrayStore
+from service.db.arrays_outside import ArrayStore
 from service.db.clock import new_id
 from service.db.engine import Database
 from service.db.models import NOBODY, Figure, Job, Quantity, Result, SweepArray

@@ -33,7 +33,7 @@ class Contact(SlidesOnALine):
     """A friction contact: elastic Coulomb with a given normal load N(t) = N0 + N1 cos(omega t + N1_phase).
 
     Of `N1` and `N1_ratio` one is given, or neither (no variation); `N1_value` is the amplitude whichever was.
-    Where N1 > N0 the contact opens. With an infinite `kt` it is rigid, see `stickslip.lab.proofs.exact`.
+    Where N1 > N0 the contact opens. With an infinite `kt` it is rigid.
     """
 
     LAW: ClassVar[str] = "coulomb"

@@ -225,15 +225,13 @@ def test_a_mistuned_reduced_disk_is_the_annulus_of_full_sectors() -> None:
 
 
 def test_the_reduction_reports_its_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where nested dissection and block Lanczos take the place of what serves small models."""
+    """Also where ARPACK takes the place of what serves small models."""
     deck, found, _, _ = a_sector()
     _, gone = joined()
     matrices = {key: csr_array(matrix) for key, matrix in found.matrices.items()}
     every = tuple(range(SECTORS // 2 + 1))
     plain = reduce_sector(matrices, gone, rows_in_use(found, deck), 8, every, SECTORS)
-    monkeypatch.setattr(fixed_interface_modes, "LARGE", 10)
     monkeypatch.setattr(fixed_interface_modes, "DENSE", 10)
-    monkeypatch.setattr("solver.matrices.reduction.multifrontal.LEAF", 8)
     large = reduce_sector(matrices, gone, rows_in_use(found, deck), 8, every, SECTORS)
     np.testing.assert_allclose(large.quality[1].held_hz, plain.quality[1].held_hz, rtol=1e-10)
     for n, quality in zip(every, plain.quality, strict=True):

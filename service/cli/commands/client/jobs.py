@@ -19,7 +19,6 @@ from service.cli.options.problem_inputs import scene_to_submit, uploaded
 from service.cli.progress import bar
 from service.errors import InputError
 from service.rendering.text import print_json, print_table, print_told, say, told
-from solver.errors import MissingExtraError
 from solver.results import units
 from solver.scene.parameter_paths import parameter
 
@@ -265,21 +264,6 @@ def _write(file: Path, answer: Mapping[str, Any]) -> None:
 
     with whole(file) as temporary:
         temporary.write_text(json.dumps(answer, allow_nan=False) + "\n", "utf-8")
-
-
-def mcp(client: Client) -> None:
-    """Let a language model use a running service.
-
-    Reads requests of the Model Context Protocol from standard input and answers on standard output, as
-    programs with a model in them expect; ends with its input.
-    """
-    from service.client.mcp_tools import server
-
-    try:
-        tools = server(client)
-    except ModuleNotFoundError as error:
-        raise MissingExtraError("mcp", "mcp") from error
-    tools.run("stdio")
 
 
 def _end(job: JobAnswer) -> None:

@@ -8,19 +8,18 @@ and deleted after it, so that a crash leaves a file too many and never one too f
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Collection, Iterator
-from pathlib import Path
 from typing import Any
 
 from service.errors import ConfigurationError, DatabaseError
+from service.db.upload_files import to_disk
 from service.jobs.figures import StoredArray
 
 OUTSIDE_BYTES = 1 << 14
 """Smaller arrays stay in the database: a file of their own would cost more than they do."""
 
 
-class ArrayStore:
+class FsspecStore:
     """Arrays in one folder of one store.
 
     Parameters
@@ -94,14 +93,3 @@ class ArrayStore:
 
     def _file(self, job_id: str, sha256: str) -> str:
         return f"{self._root}/{job_id}/{sha256}.npy"
-
-
-def to_disk(path: str | Path) -> None:
-    """Wait until a file, or what a folder names, has reached the disk."""
-    if os.name != "posix":
-        return
-    opened = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(opened)
-    finally:
-        os.close(opened)

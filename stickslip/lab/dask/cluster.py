@@ -10,7 +10,7 @@ from typing import Any
 
 from distributed import Client, Future, Security
 
-from service.workers.tasks import TOPIC, Order, TaskAnswer, ask_to_stop, compute
+from stickslip.lab.dask.tasks import TOPIC, Order, TaskAnswer, ask_to_stop, compute
 
 log = logging.getLogger("stickslip.executor")
 

@@ -26,10 +26,11 @@ from service.errors import UnknownKindError
 from service.jobs.checkpoints import KeptPieces
 from service.jobs.outputs import Pace
 from service.jobs.registry import Registry
+from service.settings.settings import Settings
 from service.workers.base import ExecutorStatus, Failed, Finished, Lost, Outcome, Sink, Stopped
-from service.workers.cluster import Cluster, answer_of
+from stickslip.lab.dask.cluster import Cluster, answer_of
 from service.workers.process_limits import UNLIMITED, ProcessLimits
-from service.workers.tasks import Order, TaskAnswer
+from stickslip.lab.dask.tasks import Order, TaskAnswer
 from service.workers.worker import failure_of
 
 log = logging.getLogger("stickslip.executor")
@@ -387,3 +388,24 @@ class DaskExecutor:
             self._leaving.clear()
         for work in running:
             self._later(self._end, work, Lost(reason))
+
+
+def of_settings(settings: Settings, registry: Registry, limits: ProcessLimits) -> DaskExecutor:
+    """Return the executor that settings with a scheduler ask for."""
+    assert settings.dask_scheduler is not None
+    security = None
+    if settings.dask_scheduler.startswith("tls://"):
+        security = Security(
+            tls_ca_file=str(settings.dask_ca_file),
+            tls_client_cert=str(settings.dask_cert_file),
+            tls_client_key=str(settings.dask_key_file),
+            require_encryption=True,
+        )
+    return DaskExecutor(
+        registry,
+        settings.dask_scheduler,
+        security=security,
+        grace_seconds=settings.grace_seconds,
+        pace=settings.pace,
+        limits=limits,
+    )

@@ -8,7 +8,7 @@ import pytest
 from service_helpers import MakeSettings
 
 from service.client.embedded import EmbeddedService
-from service.db.array_store import OUTSIDE_BYTES, ArrayStore
+from stickslip.lab.stores.array_store import OUTSIDE_BYTES, FsspecStore
 from service.db.repositories.integrity import check
 from service.errors import ConfigurationError, DatabaseError
 from service.jobs.figures import StoredArray
@@ -56,10 +56,10 @@ def test_an_array_is_on_disk_before_its_row(tmp_path: Path, monkeypatch: pytest.
     """With the folders that name it; the system is asked, as a power cut cannot be had here."""
     synced: list[int] = []
     monkeypatch.setattr(
-        "service.db.array_store.os.fsync", lambda opened: synced.append(os.fstat(opened).st_ino)
+        "stickslip.lab.stores.array_store.os.fsync", lambda opened: synced.append(os.fstat(opened).st_ino)
     )
     data = bytes(OUTSIDE_BYTES)
-    ArrayStore(str(tmp_path / "arrays")).put("job", StoredArray(sha256="digest", data=data, size=len(data)))
+    FsspecStore(str(tmp_path / "arrays")).put("job", StoredArray(sha256="digest", data=data, size=len(data)))
     file = tmp_path / "arrays" / "job" / "digest.npy"
     assert file.read_bytes() == data
     assert synced == [path.stat().st_ino for path in (file, file.parent, file.parent.parent)]

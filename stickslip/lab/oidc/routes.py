@@ -9,13 +9,14 @@ from __future__ import annotations
 import logging
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, FastAPI, Request, Response
 
 from service.auth.authenticator import Authenticator
-from service.auth.login import BEGIN_SECONDS, Login, LoginError
+from stickslip.lab.oidc.login import BEGIN_SECONDS, Login, LoginError
 from service.errors import UnauthorizedError
 from service.http.dependencies import InContext
 from service.http.middleware.admission import LOGIN, address_of
+from service.queue.core import Service
 from service.schemas.answers import AnswerModel
 
 log = logging.getLogger("stickslip.audit")
@@ -111,3 +112,9 @@ async def key(context: InContext, response: Response) -> NewKey:
     _forget(context, response, "key")
     response.headers["Cache-Control"] = "no-store"
     return NewKey(key=found)
+
+
+def offer(app: FastAPI, service: Service) -> None:
+    """Let people log in at the provider that the settings name."""
+    app.state.login = Login(service.settings, service.keys, service.jobs.now)
+    app.include_router(router)

@@ -1,0 +1,1 @@
+"""Tools by which a language model uses a running service."""

@@ -1,0 +1,1 @@
+"""Log-in at an OpenID Connect provider."""

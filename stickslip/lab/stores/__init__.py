@@ -1,0 +1,1 @@
+"""Arrays of sweeps outside of the database."""

@@ -1,0 +1,3 @@
+"""What tests of the service share."""
+
+from tests.service.conftest import *  # noqa: F403
