@@ -124,7 +124,7 @@ class House:
     def tests(self) -> int:
         """Lines of the tests, those of the lab among them."""
         found = [*(self.root / "tests").rglob("*.py"), *(self.root / LAB).glob("*/tests/*.py")]
-        return _lines_of(found)
+        return _lines_of(path for path in found if "data" not in path.parts)
 
     def deepest(self) -> int:
         """Folders below the package that lies deepest."""

@@ -152,8 +152,14 @@ def _refuse_foreign(url: str, revision: str | None, *, empty: bool) -> None:
 
 def _refuse_unknown(url: str, revision: str | None) -> None:
     known = {script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions()}
-    if revision is not None and revision not in known:
+    if revision is None or revision in known:
+        return
+    if "0000" < revision < min(known):
         raise WrongRevisionError(
-            f"{database_name(url)} is at revision {revision}, which this version does not know: it was "
-            "written by a newer stickslip. Install that one, or use another database (`--database`)"
+            f"{database_name(url)} is at revision {revision}, which was never released: bring it to "
+            f"{min(known)} with a version of its time, or use another database (`--database`)"
         )
+    raise WrongRevisionError(
+        f"{database_name(url)} is at revision {revision}, which this version does not know: it was "
+        "written by a newer stickslip. Install that one, or use another database (`--database`)"
+    )

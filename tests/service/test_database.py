@@ -223,6 +223,7 @@ def test_a_second_service_is_refused(make_settings: MakeSettings) -> None:
         assert service.job(done.id).status is JobState.SUCCESSFUL
 
 
+@pytest.mark.usefixtures("earlier")
 def test_the_first_revision_upgraded_is_the_models(url: str) -> None:
     revisions.upgrade(url, "0001")
     revisions.upgrade(url)
@@ -244,6 +245,7 @@ def test_the_first_revision_upgraded_is_the_models(url: str) -> None:
             assert named == {c.name for c in table.constraints if isinstance(c, CheckConstraint)}
 
 
+@pytest.mark.usefixtures("earlier")
 def test_an_old_database_keeps_its_rows(url: str) -> None:
     revisions.upgrade(url, "0001")
     zone = "" if is_sqlite(url) else "+00"

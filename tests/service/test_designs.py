@@ -270,6 +270,7 @@ def old_job(
         connection.execute(insert(_result).values(job_id=name, body=body))
 
 
+@pytest.mark.usefixtures("earlier")
 @pytest.mark.few(2)
 def test_the_designs_of_an_old_database_are_filled_in_and_can_be_taken_back(url: str) -> None:
     revisions.upgrade(url, "0001")

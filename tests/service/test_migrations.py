@@ -1,9 +1,13 @@
-"""A database written by the first version, with data, goes up, down and up again on both databases."""
+"""A database written by the first version, with data, goes up, down and up again on both databases.
+
+By the revisions of before the first release, which end in the tables of today.
+"""
 
 import gzip
 from pathlib import Path
 from typing import Any
 
+import earlier_revisions
 import pytest
 import sqlalchemy as sa
 from alembic import command
@@ -12,6 +16,7 @@ from service.db import revisions
 from service.db.engine import database_path, is_sqlite, migrating
 from service.db.models import JobState
 from service.db.repositories.integrity import check
+from service.errors import WrongRevisionError
 from service.queue.core import Service
 from service.settings.settings import load_settings
 
@@ -24,7 +29,7 @@ Rows = dict[str, list[dict[str, Any]]]
 
 
 @pytest.fixture
-def old(url: str, tmp_path: Path) -> str:
+def old(url: str, tmp_path: Path, earlier: None) -> str:  # noqa: ARG001
     """The old database as SQLite's file, or its rows in a PostgreSQL of the first revision."""
     file = database_path(url) if is_sqlite(url) else tmp_path / "old.db"
     file.write_bytes(gzip.decompress(OLD.read_bytes()))
@@ -98,6 +103,52 @@ def test_up_down_and_up_again_keeps_every_row(old: str) -> None:
     assert revisions.upgrade(old) == revisions.head_revision()
     assert figures(contents(old, NOW)) == held
     assert check(old).trouble == ()
+
+
+def test_both_ways_end_in_the_same_tables(url: str) -> None:
+    revisions.upgrade(url)
+    with migrating(url) as connection:
+        ours = tables_of(connection)
+    down(url, "base")
+    with migrating(url) as connection:
+        connection.exec_driver_sql("DROP TABLE alembic_version")
+    with earlier_revisions.known():
+        revisions.upgrade(url, "0001")
+        assert revisions.upgrade(url) == revisions.head_revision()
+    with migrating(url) as connection:
+        assert tables_of(connection) == ours
+    assert len(ours) > 150
+
+
+def tables_of(connection: sa.Connection) -> set[tuple[str, ...]]:
+    """Columns, keys and indexes of a database, as text; the triggers and indexes of texts too."""
+    seen = sa.inspect(connection)
+    found: set[tuple[str, ...]] = set()
+    for table in seen.get_table_names():
+        found |= {(table, each["name"], str(each["type"]), str(each["nullable"]), str(each["default"]))
+                  for each in seen.get_columns(table)}  # fmt: skip
+        others = (seen.get_pk_constraint(table), *seen.get_foreign_keys(table), *seen.get_indexes(table),
+                  *seen.get_unique_constraints(table), *seen.get_check_constraints(table))  # fmt: skip
+        # Before, SQLite's arrays referred to results by the name of the table they had been in.
+        written = (str(sorted(each.items())) for each in others)
+        found |= {(table, one.replace("sweep_id_sweep", "sweep_id_result")) for one in written}
+    if connection.dialect.name == "sqlite":
+        others = connection.exec_driver_sql("SELECT name, sql FROM sqlite_master WHERE name LIKE 'run_text%'")
+    else:
+        others = connection.exec_driver_sql(
+            "SELECT indexname, indexdef FROM pg_indexes WHERE schemaname = 'public' "
+            "UNION SELECT proname, prosrc FROM pg_proc WHERE proname = 'letters_of'"
+        )
+    return found | {tuple(map(str, row)) for row in others}
+
+
+def test_an_earlier_database_is_told_what_to_do(url: str) -> None:
+    with earlier_revisions.known():
+        revisions.upgrade(url, "0012")
+    told = r"0012, which was never released: bring it to 0013 with a version of its time"
+    for use in (revisions.prepare, revisions.upgrade):
+        with pytest.raises(WrongRevisionError, match=told):
+            use(url)
 
 
 def figures(rows: Rows) -> dict[str, dict[tuple[str, str, str], float]]:

@@ -137,6 +137,7 @@ def test_the_folder_of_a_process_that_was_killed_goes_at_once(
     assert not folder.exists()
 
 
+@pytest.mark.usefixtures("earlier")
 def test_what_an_older_version_stored_is_moved_and_moved_back(url: str) -> None:
     revisions.upgrade(url, "0012")
     held = {new_id(): data for data in (LARGE, b"abc", b"")}
