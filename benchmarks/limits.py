@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import lapack
 
 from solver import Branch
-from solver.contacts.kernels.coulomb.force import contact_force
+from solver.contacts.kernels.coulomb.line_force import contact_force
 from solver.contacts.kernels.stick_slip_events import LIFTING, SLIPPING, new_segments
 from solver.jit.fourier import Integer, Real
 

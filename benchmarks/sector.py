@@ -89,7 +89,7 @@ def _true(K: Any, M: Any, near: float) -> float:
 def _child() -> None:
     """Reduce, and print what it took."""
     from solver.matrices.sectors.elimination import elimination
-    from solver.matrices.sectors.reduction import reduce_sector
+    from solver.matrices.sectors.sector_reduction import reduce_sector
 
     M, K, low, high = bricks()
     rows = {

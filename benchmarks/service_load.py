@@ -148,7 +148,7 @@ def seconds_of_one_job(runs: int = 200) -> float:
 
 def _time_jobs(runs: int) -> float:
     from service.jobs.checkpoints import Checkpoints
-    from service.jobs.common.scenes import shipped_scene
+    from service.jobs.common.scene_requests import shipped_scene
     from service.jobs.kinds import SHIPPED, warm_up
     from service.workers.worker import Throttle, checked
 

@@ -34,7 +34,7 @@ from service.jobs.outputs import JobOutput
 from service.queue.core import Service
 from service.queue.queue import JobQueue
 from service.settings.settings import load_settings
-from service.workers.base import ExecutorStatus, Finished, Sink, Stopped
+from service.workers.executor import ExecutorStatus, Finished, Sink, Stopped
 from service.workers.worker import Throttle, checked
 
 TIMES = 100
@@ -133,7 +133,7 @@ class Work:
 
 def _one_output() -> tuple[dict[str, object], JobOutput]:
     """Return spec and output of a real small job."""
-    from service.jobs.common.scenes import shipped_scene
+    from service.jobs.common.scene_requests import shipped_scene
 
     scene = shipped_scene("two-dof")
     spec: dict[str, object] = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.harness import expect, table, timed
-from solver.contacts.kernels.circle.law import KN, KT_SECOND, coulomb_circle
+from solver.contacts.kernels.circle.circle_law import KN, KT_SECOND, coulomb_circle
 from solver.contacts.kernels.columns import COLUMNS, KT, MU
 from solver.contacts.kernels.stick_slip_events import new_segments
 from solver.jit import fourier

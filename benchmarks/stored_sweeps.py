@@ -17,9 +17,9 @@ from service.db.clock import new_id, utc_now
 from service.db.engine import Database
 from service.db.models import Job, JobState
 from service.db.repositories import ResultRepository
-from service.db.repositories.results import insert_results
-from service.jobs.figures import SWEEP, ContactValues, SweepRecord, part_names, quantities_of_record
+from service.db.repositories.result_repository import insert_results
 from service.jobs.kinds import SHIPPED
+from service.jobs.stored_figures import SWEEP, ContactValues, SweepRecord, part_names, quantities_of_record
 from service.schemas.result_queries import ResultQuery, result_page
 from service.settings.settings import load_settings
 

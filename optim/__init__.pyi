@@ -18,12 +18,15 @@ from stickslip.lab.posterior.posterior_result import (
     PosteriorStatus as PosteriorStatus,
 )
 from stickslip.lab.posterior.sampling import Sampling as Sampling
-from .identification.result import Identification as Identification, IdentifyStatus as IdentifyStatus
+from .identification.identification_result import (
+    Identification as Identification,
+    IdentifyStatus as IdentifyStatus,
+)
 from .problem.typed import Case as Case, Limit as Limit
-from .results.design import DesignResult as DesignResult, DesignStatus as DesignStatus
-from .results.parts import CatalogueOption as CatalogueOption, OptionStatus as OptionStatus
-from .robust.result import RobustResult as RobustResult, RobustStatus as RobustStatus
-from .robust.robust import robust_design as robust_design
+from .results.design_result import DesignResult as DesignResult, DesignStatus as DesignStatus
+from .results.design_parts import CatalogueOption as CatalogueOption, OptionStatus as OptionStatus
+from .robust.robust_result import RobustResult as RobustResult, RobustStatus as RobustStatus
+from .robust.robust_design import robust_design as robust_design
 from .search import design as design
 from .studies.campbell import campbell_diagram as campbell_diagram, forbidden_hz as forbidden_hz
 from stickslip.lab.catalogue.catalogue import CatalogueResult as CatalogueResult, catalogue as catalogue

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
+from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.evaluation import evaluate
-from optim.criteria.rows import DesignEvaluation
 from optim.methods.afterwards import looked_after, settled_status
 from optim.methods.eased import Eased
 from optim.methods.enough_harmonics import (
@@ -25,13 +25,13 @@ from optim.methods.enough_harmonics import (
 from optim.methods.evaluator import DesignSearch, SearchStoppedError, Tally
 from optim.methods.global_look import WholeRange
 from optim.methods.kkt import FLAT_SLOPE, Local, LocalSearch
-from optim.problem.keys import OPTIONS, ROBUST, DesignKeys, keywords
-from optim.problem.problem import Method, Problem, pose
+from optim.problem.design_problem import Method, Problem, pose
+from optim.problem.problem_keys import OPTIONS, ROBUST, DesignKeys, keywords
 from optim.problem.typed import Limit, with_limits
-from optim.results.design import DesignResult, DesignStatus
-from optim.results.parts import SAME_PLACE, LocalOptimum, OnBest
+from optim.results.design_parts import SAME_PLACE, LocalOptimum, OnBest
+from optim.results.design_result import DesignResult, DesignStatus
 from solver.continuation.branch import BranchStatus
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 

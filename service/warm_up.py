@@ -15,7 +15,7 @@ import os
 import optim
 import solver
 from service.jobs.kinds import warm_up
-from solver.contacts.laws.registry import laws
+from solver.contacts.laws.law_registry import laws
 from solver.jit import beside
 
 

@@ -13,9 +13,12 @@ from .continuation.extrema.error_estimate import (
     branch_errors as branch_errors,
 )
 from .continuation.marks import Bifurcations as Bifurcations, Mark as Mark, MarkKind as MarkKind
-from .continuation.peaks import Band as Band, Peak as Peak
+from .continuation.peak import Band as Band, Peak as Peak
 from .continuation.segment import Course as Course, Stretch as Stretch, joined as joined
-from .continuation.settings import ContinuationSettings as ContinuationSettings, Predictor as Predictor
+from .continuation.continuation_settings import (
+    ContinuationSettings as ContinuationSettings,
+    Predictor as Predictor,
+)
 from .errors import (
     Issue as Issue,
     MissingExtraError as MissingExtraError,
@@ -26,12 +29,12 @@ from .errors import (
     StoppedError as StoppedError,
 )
 from .marching.march import march as march
-from .marching.start import MarchStart as MarchStart
+from .marching.march_start import MarchStart as MarchStart
 from .marching.transient import transient as transient
 from stickslip.lab.proofs.certified_cycles import certify_cycle as certify_cycle
 from stickslip.lab.controlled.controlled import held_amplitude as held_amplitude
 from stickslip.lab.controlled.phase_resonance import phase_resonance as phase_resonance
-from .modes.gradient import ModeGradient as ModeGradient, mode_gradient as mode_gradient
+from .modes.mode_gradient import ModeGradient as ModeGradient, mode_gradient as mode_gradient
 from stickslip.lab.limit_cycles.limit_cycles import (
     LimitCycle as LimitCycle,
     LimitCycles as LimitCycles,
@@ -43,7 +46,7 @@ from .modes.peaks.performance import (
     PerformanceCurve as PerformanceCurve,
     performance_curve as performance_curve,
 )
-from .modes.results import (
+from .modes.mode_results import (
     HeldAmplitude as HeldAmplitude,
     HeldStatus as HeldStatus,
     NonlinearMode as NonlinearMode,
@@ -154,7 +157,7 @@ from stickslip.lab.worst_mistuning.worst_result import (
 )
 from .studies.study_results import MapStatus as MapStatus, ResponseMap as ResponseMap
 from .studies.peaks.minimise_peak import least_peak as least_peak
-from .studies.peaks.results import (
+from .studies.peaks.track_results import (
     Basin as Basin,
     LeastPeak as LeastPeak,
     PeakTrack as PeakTrack,

@@ -1,1 +1,1 @@
-"""What a design is judged by: one criterion a file, put into one registry (`optim.criteria.registry`)."""
+"""What a design is judged by: one criterion a file, put into one registry (`criterion_registry`)."""

@@ -58,7 +58,7 @@ def positive_limit(asked: CriterionContext) -> object:
     DesignError
         It is none.
     """
-    from optim.problem.numbers import positive
+    from optim.problem.problem_numbers import positive
 
     ((name, value),) = asked.values.items()
     return positive(name, value)
@@ -66,7 +66,7 @@ def positive_limit(asked: CriterionContext) -> object:
 
 def registered(name: str) -> Criterion:
     """Return the criterion of a name; KeyError if there is none here."""
-    from optim.criteria.registry import criteria
+    from optim.criteria.criterion_registry import criteria
 
     return {one.name: one for one in criteria()}[name]
 

@@ -1,6 +1,6 @@
 """The damping ratio of a nonlinear mode at an amplitude, from below.
 
-Its derivatives by the parameters are those of the mode at that amplitude (`solver.modes.gradient` and
+Its derivatives by the parameters are those of the mode at that amplitude (`solver.modes.mode_gradient` and
 `hessian`), whatever the excitation.
 """
 
@@ -78,7 +78,7 @@ def read_mode(asked: CriterionContext, key: str, number: str, *, needed: bool) -
     The limit, the modal amplitude [√kg m] and the number of the mode.
     """
     from optim.errors import DesignError
-    from optim.problem.numbers import positive, whole
+    from optim.problem.problem_numbers import positive, whole
     from solver.errors import at
     from solver.modes.nonlinear_mode import pose
 

@@ -6,19 +6,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
+from optim.criteria.constraint_rows import CaseResponse, DesignEvaluation
 from optim.criteria.criterion import Criterion, CriterionRow, Judged
-from optim.criteria.registry import criteria
-from optim.criteria.rows import CaseResponse, DesignEvaluation
+from optim.criteria.criterion_registry import criteria
 from optim.problem.cases import LoadCase
-from optim.problem.problem import Problem
+from optim.problem.design_problem import Problem
 from optim.problem.variables import parameter_values
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.continuation.branch import Branch
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
+from solver.continuation.continuation_settings import ContinuationSettings
 from solver.continuation.segment import Course
-from solver.continuation.settings import ContinuationSettings
 from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene
 from solver.studies.peaks.seeds import fitted

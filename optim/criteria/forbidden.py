@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key, Ranges
 from optim.criteria.key import BandsHz, RangesRpm
-from optim.criteria.peak import maxima
+from optim.criteria.peak_criterion import maxima
 
 if TYPE_CHECKING:
     from optim.problem.cases import LoadCase
@@ -37,7 +37,7 @@ def _read(asked: CriterionContext) -> Mapping[str, Ranges]:
 
 def _ranges(name: str, ranges: object) -> Ranges:
     from optim.errors import DesignError
-    from optim.problem.numbers import number_pair
+    from optim.problem.problem_numbers import number_pair
 
     if ranges is None:
         return ()

@@ -13,8 +13,8 @@ from typing import Annotated
 import numpy as np
 from scipy.optimize import nnls
 
+from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.criterion import Criterion, CriterionRow
-from optim.criteria.rows import DesignEvaluation
 from optim.problem.variables import BoundedVariable, Real, scaled, slopes
 
 PENALTY = 1e4  # the largest exact penalty on the largest relative excess over a bound

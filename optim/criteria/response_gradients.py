@@ -19,7 +19,7 @@ import numpy as np
 from optim.problem.variables import Real
 from solver.balance.balance import Balance
 from solver.continuation.extrema.extrema import HALF_POWER
-from solver.continuation.peaks import Edge, Peak
+from solver.continuation.peak import Edge, Peak
 from solver.errors import SettingError
 from solver.sensitivity.gradient import Sensitivities
 from solver.sensitivity.nonsmooth import peak_gradient

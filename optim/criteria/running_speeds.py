@@ -9,7 +9,7 @@ from pydantic import Field
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key, Ranges
 from optim.criteria.key import PositiveNumber, RangeRpm, SpeedRpm
-from optim.criteria.peak import maxima
+from optim.criteria.peak_criterion import maxima
 
 if TYPE_CHECKING:
     from optim.problem.cases import LoadCase
@@ -38,7 +38,7 @@ def _rows(judged: Judged) -> list[CriterionRow]:
 
 def _read(asked: CriterionContext) -> _Running:
     from optim.errors import DesignError
-    from optim.problem.numbers import is_number, number_pair, positive
+    from optim.problem.problem_numbers import is_number, number_pair, positive
 
     speeds, bound = asked.values.get(_SPEEDS), asked.values.get(_LIMIT)
     if speeds is None:

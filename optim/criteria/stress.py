@@ -1,7 +1,7 @@
 """The greatest alternating stress at recovered rows over the band: half peak to peak of each.
 
 A row of a recovery matrix is one more observed quantity of the same response, so its peaks, their gradients
-and second derivatives are those of `optim.criteria.peak`.
+and second derivatives are those of `optim.criteria.peak_criterion`.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key
 from optim.criteria.key import number_or_table
-from optim.criteria.peak import COMPETES, maxima
+from optim.criteria.peak_criterion import COMPETES, maxima
 from solver.results.units import STRESS_UNITS
 
 if TYPE_CHECKING:
     from solver.scene.materials import Haigh
-    from solver.scene.parts import Recovered
     from solver.scene.scene import Scene
+    from solver.scene.scene_records import Recovered
 
 _KEY = "max_stress"
 
@@ -54,7 +54,7 @@ def by_row(key: str, given: object, names: list[str], lacking: str) -> Mapping[s
         What is wrong.
     """
     from optim.errors import DesignError
-    from optim.problem.numbers import positive_of_each
+    from optim.problem.problem_numbers import positive_of_each
 
     if not names:
         raise DesignError(key, given, lacking)

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key
 from optim.criteria.key import number_or_table
-from optim.criteria.peak import maxima
+from optim.criteria.peak_criterion import maxima
 from optim.criteria.stress import by_row, leading, of_row, seen_by
 
 if TYPE_CHECKING:
-    from solver.continuation.peaks import Peak
-    from solver.scene.parts import Recovered
+    from solver.continuation.peak import Peak
     from solver.scene.scene import Scene
+    from solver.scene.scene_records import Recovered
 
 _KEY = "min_margin"
 

@@ -12,19 +12,19 @@ import numpy as np
 from optim.errors import DataError, DesignError
 from optim.identification.data.response import ResponseRun
 from optim.identification.fit import MOST_STARTS, STARTS, LocalFit, Noise, Runs, Searched, search
+from optim.identification.identification_result import Estimate, Identification, IdentifyStatus, NotReached
 from optim.identification.information import UNIFORM, Information, information, strong_correlations, untold
 from optim.identification.model_check import doubts
 from optim.identification.next_measurement import rank, read_candidates
 from optim.identification.reading import Given, read_data
-from optim.identification.result import Estimate, Identification, IdentifyStatus, NotReached
 from optim.identification.unknowns import Unknowns, read_unknowns
-from optim.problem.numbers import is_number
+from optim.problem.problem_numbers import is_number
 from optim.problem.uncertainty_input import CONFIDENCE, read_uncertain
 from optim.problem.variables import Real
 from solver.balance.balance import check_harmonics
 from solver.balance.parameter import resolve
 from solver.errors import SceneError, SettingError
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 

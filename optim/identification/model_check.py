@@ -27,8 +27,8 @@ from solver.balance.balance import build
 from solver.balance.parameter_derivatives import reason_without
 from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.scene.matrices_structure import MatricesStructure
-from solver.scene.parts import Damper, Mass, Spring
 from solver.scene.scene import Scene
+from solver.scene.scene_records import Damper, Mass, Spring
 
 _LEVEL = 2.5e-3  # probability by which each test doubts a model that is right
 _FEWEST = 8  # residuals of a curve from which their order says something

@@ -12,13 +12,11 @@ import numpy as np
 
 from optim.errors import DataError
 from optim.identification.data.measured import KINDS, DataKind, MeasuredRows, known_words
-from optim.identification.data.table import Table, check_numbers, runs_of
-from optim.identification.data.units import Dimension, unit_of
+from optim.identification.data.measured_table import Table, check_numbers, runs_of
+from optim.identification.data.measured_units import Dimension, unit_of
 from optim.identification.readers.csv_text import FORMAT as CSV
 from optim.identification.readers.csv_text import FromText, read_text
-from optim.identification.readers.encodings import text_of
-from optim.identification.readers.headings import Choice
-from optim.identification.readers.registry import (
+from optim.identification.readers.data_readers import (
     KIND_WORD,
     Head,
     complex_apart,
@@ -27,6 +25,8 @@ from optim.identification.readers.registry import (
     read_head,
     table_of,
 )
+from optim.identification.readers.encodings import text_of
+from optim.identification.readers.headings import Choice
 from solver.errors import SettingError
 from solver.scene.parameter_paths import find_parameter
 from solver.scene.scene import Scene

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from optim.errors import DesignError
-from optim.problem.numbers import is_number
+from optim.problem.problem_numbers import is_number
 from optim.problem.variables import (
     BoundedVariable,
     Real,

@@ -7,19 +7,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.evaluation import evaluate, natural_scales
 from optim.criteria.linearised import Conditions, conditions, model_of
-from optim.criteria.rows import DesignEvaluation
 from optim.methods.enough_harmonics import MOST_HARMONICS
 from optim.methods.evaluator import DesignSearch, SearchStoppedError
 from optim.methods.kkt import KEPT, KKT_TOLERANCE, optimum_at
 from optim.methods.plateau import DesignPlateau, Tick, nothing, plateau_of
-from optim.problem.problem import Method, Problem
-from optim.results.design import DesignResult, DesignStatus
+from optim.problem.design_problem import Method, Problem
+from optim.results.design_parts import Checked, LocalOptimum
+from optim.results.design_result import DesignResult, DesignStatus
 from optim.results.doubts import DOUBTFUL, open_peaks
 from optim.results.json import known_parts
-from optim.results.parts import Checked, LocalOptimum
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.results.watch import ShouldStop
 
 HELD = 1e-7  # multiplier of a bound, relative objective per scaled variable, from which it holds the design

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated
 from optim.criteria.criterion import Limits
 from optim.methods.afterwards import of_one
 from optim.methods.evaluator import DesignSearch, SearchStoppedError
-from optim.problem.problem import Method, Problem
-from optim.results.design import DesignStatus
+from optim.problem.design_problem import Method, Problem
+from optim.results.design_result import DesignStatus
 
 if TYPE_CHECKING:
-    from optim.results.design import DesignResult
+    from optim.results.design_result import DesignResult
 
 NO_LIMITS = Limits()
 MOST_CASES = 4

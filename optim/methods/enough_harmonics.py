@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.evaluation import evaluate
-from optim.criteria.rows import DesignEvaluation
-from optim.problem.problem import Method, Problem
-from optim.results.design import DesignResult, DesignStatus
+from optim.problem.design_problem import Method, Problem
+from optim.results.design_result import DesignResult, DesignStatus
 from optim.results.doubts import WELL_KNOWN, doubt_of
 from optim.results.json import known_parts, over_bands
 from solver.balance.balance import build

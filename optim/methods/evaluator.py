@@ -7,15 +7,15 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 
+from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.evaluation import evaluate, natural_scales
 from optim.criteria.linearised import Model, model_of
-from optim.criteria.rows import DesignEvaluation
 from optim.methods.kkt import KEPT
-from optim.problem.problem import Problem
+from optim.problem.design_problem import Problem
 from optim.problem.variables import BoundedVariable
-from optim.results.design import DesignStatus
+from optim.results.design_parts import FEWER_HARMONICS, PEAKS_OPEN, VERIFIED, BestSoFar, OnBest
+from optim.results.design_result import DesignStatus
 from optim.results.doubts import open_peaks
-from optim.results.parts import FEWER_HARMONICS, PEAKS_OPEN, VERIFIED, BestSoFar, OnBest
 from solver.results.spread import Ahead
 from solver.results.watch import OnProgress, ShouldStop
 

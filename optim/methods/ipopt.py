@@ -22,9 +22,9 @@ from typing import Any
 import casadi
 import numpy as np
 
+from optim.criteria.constraint_rows import DesignEvaluation, nearest
 from optim.criteria.criterion import CriterionRow
 from optim.criteria.linearised import Model
-from optim.criteria.rows import DesignEvaluation, nearest
 from optim.methods.kkt import KKT_TOLERANCE, Evaluate, Local, ModelOf, ended
 from optim.problem.variables import SNAP, BoundedVariable, Real, snapped, unscaled
 

@@ -8,10 +8,10 @@ from typing import Annotated
 
 import numpy as np
 
+from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.linearised import Conditions, Model, conditions
-from optim.criteria.rows import DesignEvaluation
 from optim.problem.variables import BoundedVariable
-from optim.results.parts import LocalOptimum
+from optim.results.design_parts import LocalOptimum
 
 Evaluate = Callable[[Mapping[str, float]], DesignEvaluation]
 ModelOf = Callable[[DesignEvaluation], Model]

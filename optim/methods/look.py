@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from optim.criteria.rows import DesignEvaluation
+from optim.criteria.constraint_rows import DesignEvaluation
 from optim.methods.evaluator import DesignSearch
 from optim.methods.kkt import KEPT, Local, is_flat
 from optim.methods.surrogate import (

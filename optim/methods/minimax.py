@@ -14,9 +14,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from optim.criteria.constraint_rows import DesignEvaluation, nearest
 from optim.criteria.criterion import CriterionRow
 from optim.criteria.linearised import PENALTY, Model, with_cuts
-from optim.criteria.rows import DesignEvaluation, nearest
 from optim.methods.conic import Step, solve_subproblem
 from optim.methods.kkt import KEPT, Evaluate, Local, ModelOf, ended
 from optim.problem.variables import BoundedVariable, Real, snapped, unscaled

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from optim.criteria.rows import DesignEvaluation
+from optim.criteria.constraint_rows import DesignEvaluation
 from optim.methods.evaluator import DesignSearch
 from optim.methods.kkt import Local, ended, standing
 from optim.problem.variables import Real, scaled, snapped, unscaled

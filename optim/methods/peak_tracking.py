@@ -5,18 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from optim.criteria.constraint_rows import CaseResponse, DesignEvaluation
 from optim.criteria.evaluation import Judge, effects_of, evaluate, ranges_of
-from optim.criteria.peak import PEAK
-from optim.criteria.rows import CaseResponse, DesignEvaluation
+from optim.criteria.peak_criterion import PEAK
 from optim.methods.afterwards import of_one
-from optim.problem.problem import Method, Problem
-from optim.results.design import DesignResult, DesignStatus
-from optim.results.parts import PEAKS_OPEN, VERIFIED, BestSoFar, LocalOptimum, OnBest
+from optim.problem.design_problem import Method, Problem
+from optim.results.design_parts import PEAKS_OPEN, VERIFIED, BestSoFar, LocalOptimum, OnBest
+from optim.results.design_result import DesignResult, DesignStatus
 from solver.continuation.branch import Branch
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.results.watch import OnProgress, ShouldStop
 from solver.studies.peaks.minimise_peak import least_peak
-from solver.studies.peaks.results import LeastPeak, TrackStatus
+from solver.studies.peaks.track_results import LeastPeak, TrackStatus
 
 _STATUS = {
     TrackStatus.TRACKED: DesignStatus.OPTIMAL,

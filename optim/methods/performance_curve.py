@@ -16,16 +16,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 
+from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.evaluation import evaluate
-from optim.criteria.rows import DesignEvaluation
 from optim.methods.afterwards import of_one
 from optim.methods.evaluator import SearchStoppedError
 from optim.methods.surrogate import quasi_random
-from optim.problem.problem import Method, Problem
+from optim.problem.design_problem import Method, Problem
 from optim.problem.variables import BoundedVariable, Real, by_variables, parameter_values, unscaled
-from optim.results.design import DesignResult, DesignStatus
-from optim.results.parts import CurveCheck
-from solver.jit.clock import clock
+from optim.results.design_parts import CurveCheck
+from optim.results.design_result import DesignResult, DesignStatus
+from solver.jit.timer import clock
 from solver.modes.peaks.peak_correction import corrected_peak
 from solver.modes.peaks.peak_gradient import CurvePeak, peak_at_excitation
 from solver.modes.peaks.performance import PerformanceCurve

@@ -12,15 +12,15 @@ from typing import Annotated
 
 import numpy as np
 
+from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.criterion import CriterionRow
 from optim.criteria.evaluation import evaluate, natural_scales
-from optim.criteria.peak import PEAK
-from optim.criteria.rows import DesignEvaluation
+from optim.criteria.peak_criterion import PEAK
 from optim.methods.evaluator import SearchStoppedError
 from optim.methods.kkt import KEPT
-from optim.problem.problem import Problem
+from optim.problem.design_problem import Problem
 from optim.problem.variables import BoundedVariable, parameter_values
-from optim.results.design import DesignStatus
+from optim.results.design_result import DesignStatus
 from solver.continuation.between import least_between, level_up_to
 from solver.response.solve import solve
 from solver.results.watch import ShouldStop

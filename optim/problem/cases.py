@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Annotated
 
 from optim.errors import DesignError
-from optim.problem.numbers import number_pair, positive, whole
+from optim.problem.problem_numbers import number_pair, positive, whole
 from optim.problem.variables import BoundedVariable
 from solver.errors import Place, SettingError, at
 from solver.scene.scene import Scene

@@ -10,10 +10,10 @@ from functools import partial
 from typing import Any
 
 from optim.criteria.criterion import CriterionContext
-from optim.criteria.registry import criteria
+from optim.criteria.criterion_registry import criteria
 from optim.problem.cases import read_case, read_cases
-from optim.problem.numbers import positive
-from optim.problem.problem import READERS, pose, read_start
+from optim.problem.design_problem import READERS, pose, read_start
+from optim.problem.problem_numbers import positive
 from optim.problem.uncertainty_input import read_uncertain
 from optim.problem.variables import beside_cases, check_variables
 from solver.errors import Issue, Place, SceneError, SettingError
@@ -30,7 +30,7 @@ def problem_issues(scene: Scene, given: Mapping[str, Any]) -> list[Issue]:
     Parameters
     ----------
     scene : what is designed.
-    given : the arguments of `optim.problem.problem.pose`, as tables and lists.
+    given : the arguments of `optim.problem.design_problem.pose`, as tables and lists.
     """
     whole = _refusal((), partial(pose, scene, **given))
     if whole is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 
-from optim.criteria.registry import limit_keys
+from optim.criteria.criterion_registry import limit_keys
 from optim.errors import DesignError
 from solver.wording import nearest
 

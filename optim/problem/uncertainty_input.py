@@ -11,7 +11,7 @@ from scipy.special import gammaincinv
 
 from optim.errors import DesignError
 from optim.problem.cases import LoadCase, displaced
-from optim.problem.numbers import is_number
+from optim.problem.problem_numbers import is_number
 from optim.problem.uncertainty_set import Coordinate, Disk, How, Scenario, UncertainSet, UncertaintyShape
 from optim.problem.variables import BoundedVariable, Real
 from solver.balance.parameter import Kind, resolve

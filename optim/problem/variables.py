@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from optim.errors import DesignError
 from optim.problem.default_variable import ABOVE, BELOW, default_variable
-from optim.problem.numbers import number_pair, word
+from optim.problem.problem_numbers import number_pair, word
 from optim.problem.words import Scaling
 from solver.balance.parameter import Kind, resolve
 from solver.errors import at

@@ -6,13 +6,13 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from optim.results.design_parts import Checked
 from optim.results.json import known_parts
-from optim.results.parts import Checked
 from solver.results.known import Known
 from solver.results.notes import flag_words, notes_of_all
 
 if TYPE_CHECKING:
-    from optim.criteria.rows import DesignEvaluation
+    from optim.criteria.constraint_rows import DesignEvaluation
 
 DOUBTFUL = 0.1  # estimated error of a peak, relative, from which its harmonics are too few
 WELL_KNOWN = 0.05  # relative error of the highest peak up to which a design may be called the best

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from solver.results.told import json_number
 
 if TYPE_CHECKING:
+    from optim.criteria.constraint_rows import DesignEvaluation
     from optim.criteria.linearised import Conditions
-    from optim.criteria.rows import DesignEvaluation
     from solver.continuation.branch import Branch
     from solver.results.known import Known
 

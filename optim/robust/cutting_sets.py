@@ -7,18 +7,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated
 
-from optim.criteria.peak import PEAK
-from optim.criteria.rows import DesignEvaluation
+from optim.criteria.constraint_rows import DesignEvaluation
+from optim.criteria.peak_criterion import PEAK
 from optim.methods.kkt import Local, is_flat
 from optim.methods.surrogate import quasi_random
-from optim.problem.problem import Problem
+from optim.problem.design_problem import Problem
 from optim.problem.uncertainty_set import Scenario
 from optim.problem.variables import scaled, unscaled
-from optim.results.design import DesignResult
-from optim.results.parts import SAME_PLACE
-from optim.robust.result import Cut, RobustStatus
+from optim.results.design_parts import SAME_PLACE
+from optim.results.design_result import DesignResult
+from optim.robust.robust_result import Cut, RobustStatus
+from optim.robust.robust_search import RobustSearch
 from optim.robust.scenarios import Outcome, number_of
-from optim.robust.search import RobustSearch
 from optim.robust.worst_case import MOST_BESIDES, Aspect, Finding, UnknownScenarioError
 
 CLOSED = (

@@ -10,19 +10,19 @@ from typing import Annotated
 
 import numpy as np
 
+from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.criterion import Criterion, CriterionRow
 from optim.criteria.evaluation import Judge, effects_of, evaluate, ranges_of
 from optim.criteria.linearised import PENALTY, Model, model_of
-from optim.criteria.rows import DesignEvaluation
 from optim.problem.cases import LoadCase
-from optim.problem.problem import Problem
+from optim.problem.design_problem import Problem
 from optim.problem.uncertainty_set import Coordinate, Scenario
 from optim.problem.variables import BoundedVariable, Real, parameter_values
 from optim.problem.words import Aim
 from optim.results.json import over_bands
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
-from solver.continuation.settings import ContinuationSettings
+from solver.continuation.continuation_settings import ContinuationSettings
 from solver.results.known import Known, worst_of
 from solver.studies.blades import blade_peaks, blade_rows
 

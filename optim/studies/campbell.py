@@ -14,17 +14,17 @@ import numpy as np
 
 from optim.errors import DesignError
 from optim.problem.cases import with_engine_order
-from optim.problem.numbers import number_pair
+from optim.problem.problem_numbers import number_pair
 from optim.studies.crossings import CampbellDiagram, CampbellStatus, Crossing, OrderResponse, Ranges
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.error_estimate import ErrorEstimator
-from solver.continuation.peaks import Peak
+from solver.continuation.peak import Peak
 from solver.errors import Place
-from solver.jit.clock import clock
 from solver.jit.fourier import Real
+from solver.jit.timer import clock
 from solver.linear.natural_frequencies import natural_frequencies
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.scene import Scene

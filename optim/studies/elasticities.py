@@ -14,7 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from optim.criteria.peak import COMPETES
+from optim.criteria.peak_criterion import COMPETES
 from optim.criteria.response_gradients import Sensitivity
 from optim.problem.variables import Real
 from optim.studies.sensitivity_result import (
@@ -26,12 +26,12 @@ from optim.studies.sensitivity_result import (
 from solver.balance.parameter import resolve
 from solver.balance.parameter_derivatives import reason_without
 from solver.balance.simplifications import Effects, even_harmonics_reason
-from solver.contacts.laws.harmonics import is_phase
+from solver.contacts.laws.load_harmonics import is_phase
 from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.extrema import HALF_POWER
-from solver.continuation.peaks import Peak
-from solver.jit.clock import clock
+from solver.continuation.peak import Peak
+from solver.jit.timer import clock
 from solver.scene.parameter_paths import PHASE
 from solver.scene.scene import Scene
 

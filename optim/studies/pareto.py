@@ -18,21 +18,21 @@ import numpy as np
 from scipy.optimize import linprog
 
 from optim.criteria.band import BAND
+from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.linearised import ACTIVE, Model, bounds_held
-from optim.criteria.peak import PEAK
-from optim.criteria.rows import DesignEvaluation
+from optim.criteria.peak_criterion import PEAK
 from optim.errors import DesignError
 from optim.methods.enough_harmonics import honest
 from optim.methods.evaluator import DesignSearch, SearchStoppedError
 from optim.methods.kkt import Local
-from optim.problem.keys import FEWEST_POINTS, POINTS, FrontKeys, keywords
-from optim.problem.problem import Method, Problem, pose
+from optim.problem.design_problem import Method, Problem, pose
+from optim.problem.problem_keys import FEWEST_POINTS, POINTS, FrontKeys, keywords
 from optim.problem.typed import Limit, with_limits
 from optim.problem.variables import BoundedVariable, scaled, unscaled
-from optim.results.design import DesignResult, DesignStatus
+from optim.results.design_result import DesignResult, DesignStatus
 from optim.search import judge, local_search_of, solve_problem
 from optim.studies.pareto_result import ParetoPoint, ParetoResult, ParetoStatus, front_of
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 

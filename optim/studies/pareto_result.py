@@ -15,8 +15,8 @@ from solver.results.told import Piece
 from solver.results.views import Views
 
 if TYPE_CHECKING:
-    from optim.problem.problem import Problem
-    from optim.results.design import DesignResult, DesignStatus
+    from optim.problem.design_problem import Problem
+    from optim.results.design_result import DesignResult, DesignStatus
 
 SAME = 1e-7  # relative distance within which two points are one
 

@@ -17,7 +17,7 @@ from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
-    from solver.continuation.peaks import Peak
+    from solver.continuation.peak import Peak
 
 
 class SensitivityStatus(Enum):

@@ -14,11 +14,11 @@ from solver.views.to_dataset import attributes, column
 from solver.views.to_dataset import described as described  # of classes that say their data set
 
 if TYPE_CHECKING:
-    from optim.criteria.rows import DesignEvaluation
-    from optim.identification.result import Identification
+    from optim.criteria.constraint_rows import DesignEvaluation
+    from optim.identification.identification_result import Identification
     from optim.problem.variables import BoundedVariable as DesignVariable
-    from optim.results.design import DesignResult
-    from optim.robust.result import RobustResult
+    from optim.results.design_result import DesignResult
+    from optim.robust.robust_result import RobustResult
     from optim.studies.crossings import CampbellDiagram
     from optim.studies.pareto_result import ParetoResult
     from optim.studies.sensitivity_result import SensitivityResult

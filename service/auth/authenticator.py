@@ -20,7 +20,7 @@ from service.auth.callers import KEYLESS, NO_LIMITS, Caller, KeyLimits, Scope, i
 from service.db.clock import Clock
 from service.db.models import NOBODY, ApiKey
 from service.db.repositories.owned import KEYS, KeyRepository
-from service.db.repositories.runs import NO_LINK, RunRow, Shares
+from service.db.repositories.run_repository import NO_LINK, RunRow, Shares
 from service.db.tokens import Made, digest_of, matches
 from service.errors import (
     ForbiddenError,

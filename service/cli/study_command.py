@@ -85,7 +85,7 @@ class Outputs:
 
 def add_others(group: TyperGroup) -> None:
     """Add the commands of the studies that the setting `kinds` names."""
-    from service.jobs.common.problem import ProblemRequest
+    from service.jobs.common.problem_requests import ProblemRequest
     from service.jobs.kinds import studies
     from service.settings.kinds import registry_here
 
@@ -94,7 +94,7 @@ def add_others(group: TyperGroup) -> None:
             continue
         made = command_of
         if issubclass(study, ProblemRequest):
-            made = on_demand("service.cli.commands.design:command_of_problem")
+            made = on_demand("service.cli.commands.design_commands:command_of_problem")
         alone = typer.Typer(add_completion=False, rich_markup_mode=None)
         alone.command(name)(made(study))
         group.add_command(typer.main.get_command(alone))

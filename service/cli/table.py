@@ -29,8 +29,8 @@ class CommandEntry:
     name: Annotated[str, "As the user writes it."]
     home: Annotated[
         str,
-        'Module of `service.cli` and function, ``"commands.scenes.scenes"``, or the whole name of one in the '
-        "lab; `STUDY` for that of a study.",
+        'Module of `service.cli` and function, ``"commands.scene_commands.scenes"``, or the whole name of '
+        "one in the lab; `STUDY` for that of a study.",
     ]
     summary: Annotated[str, "The first line of the function's docstring, which `--help` shows."]
     keyed: Annotated[bool, "It talks to a service, and takes ``--url`` and ``--key-file``."] = False
@@ -149,7 +149,7 @@ class LazyGroup(TyperGroup):
         return name, command, rest
 
 
-_RUNS = "commands.client.runs"
+_RUNS = "commands.client.run_commands"
 DATABASE = (
     CommandEntry("upgrade", "commands.service.upgrade", "Bring a database to this version's revision."),
     CommandEntry(
@@ -164,16 +164,16 @@ DATABASE = (
 )  # fmt: skip
 
 KEYS = (
-    CommandEntry("create", "commands.keys.create", "Make a key and print it, this once."),
+    CommandEntry("create", "commands.key_commands.create", "Make a key and print it, this once."),
     CommandEntry(
-        "list", "commands.keys.show",
+        "list", "commands.key_commands.show",
         "List the keys, also those that work no more. What opens the door is not kept, and not shown.",
     ),
     CommandEntry(
-        "rotate", "commands.keys.rotate",
+        "rotate", "commands.key_commands.rotate",
         "Give a key another secret and print it, this once; the old one ends within a second.",
     ),
-    CommandEntry("revoke", "commands.keys.revoke", "End a key, within a second in every service."),
+    CommandEntry("revoke", "commands.key_commands.revoke", "End a key, within a second in every service."),
 )  # fmt: skip
 
 RUNS = (
@@ -221,14 +221,16 @@ COMMANDS = {
         CommandEntry("peaks", STUDY, "Track the highest peak over a parameter."),
     ),
     "Design": (
-        CommandEntry("design", "commands.design.design", "Find the best damper."),
-        CommandEntry("pareto", "commands.design.pareto", "Find the front of peak against resonance band."),
+        CommandEntry("design", "commands.design_commands.design", "Find the best damper."),
+        CommandEntry(
+            "pareto", "commands.design_commands.pareto", "Find the front of peak against resonance band."
+        ),
         CommandEntry(
             "margin", STUDY,
             "Draw the stress over the excitation for several dampers, and the excitation each allows.",
         ),
         CommandEntry(
-            "identify", "commands.identify.identify",
+            "identify", "commands.identify_command.identify",
             "Find parameters from measured responses and hysteresis loops.",
         ),
         CommandEntry(
@@ -253,7 +255,7 @@ COMMANDS = {
         ),
     ),
     "Scenes and files": (
-        CommandEntry("scenes", "commands.scenes.scenes", "List the shipped scenes."),
+        CommandEntry("scenes", "commands.scene_commands.scenes", "List the shipped scenes."),
         CommandEntry(
             "import", "commands.import_matrices.import_scene", "Make a scene of matrices or modes in files.",
         ),
@@ -262,7 +264,7 @@ COMMANDS = {
             "Write a scene for other programs: equations for MATLAB, a unit for co-simulation (FMI 2.0).",
         ),
         CommandEntry(
-            "schema", "commands.scenes.schema",
+            "schema", "commands.scene_commands.schema",
             "Print the JSON Schema of scene files, design problems or jobs, for editors.",
         ),
         CommandEntry(
@@ -281,9 +283,11 @@ COMMANDS = {
         CommandEntry(
             "submit", "commands.client.submit.SubmitGroup", "Hand a job to a running service.", group=True
         ),
-        CommandEntry("watch", "commands.client.jobs.watch", "Follow a job until it has ended.", keyed=True),
         CommandEntry(
-            "results", "commands.client.jobs.results",
+            "watch", "commands.client.job_commands.watch", "Follow a job until it has ended.", keyed=True
+        ),
+        CommandEntry(
+            "results", "commands.client.job_commands.results",
             "Print what a job computed, or list the stored designs.", keyed=True,
         ),
         CommandEntry(

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Self
 
+from service.jobs.kind_registry import Registry
 from service.jobs.outputs import OnProgress
-from service.jobs.registry import Registry
 from service.jobs.strict_json import validated
 from service.queue.core import Service
 from service.schemas.answers import (

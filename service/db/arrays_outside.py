@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from typing import Protocol
 
-from service.jobs.figures import StoredArray
+from service.jobs.stored_figures import StoredArray
 from solver.lab import from_lab
 
 

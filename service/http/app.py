@@ -23,19 +23,14 @@ from service.http.middleware.admission import Admission, ConcurrencyLimits, by_l
 from service.http.middleware.connections import Connections
 from service.http.middleware.every_answer import HeadAsGet, HeadersAndAudit, RequestLog
 from service.http.reports import Reports
-from service.http.routes import (
-    events,
-    forms,
-    jobs,
-    page,
-    run_list,
-    runs,
-    scenes,
-    stored,
-    uploads,
-)
+from service.http.routes import events, page, run_list, stored
+from service.http.routes import form_routes as forms
+from service.http.routes import job_routes as jobs
+from service.http.routes import run_routes as runs
+from service.http.routes import scene_routes as scenes
+from service.http.routes import upload_routes as uploads
 from service.http.routes.events import Looks
-from service.jobs.registry import Registry
+from service.jobs.kind_registry import Registry
 from service.queue.core import SOLVER_VERSION, Service
 from service.queue.health import Probe
 from service.schemas import problems

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from service.errors import InvalidRequestError, issues_to_json
 from service.http.dependencies import Context
 from service.jobs.answering import KIND, PREVIEW, RESOLVE, Prepared
-from service.jobs.registry import JobKind, JobRequest, SceneSource
+from service.jobs.kind_registry import JobKind, JobRequest, SceneSource
 from service.jobs.strict_json import JsonText
 from service.queue.core import SOLVER_VERSION
 from service.queue.lanes import Lane, Lanes

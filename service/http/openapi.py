@@ -12,10 +12,10 @@ from pydantic import BaseModel
 from service import errors
 from service.http.constant import Constant
 from service.http.middleware.admission import OPEN
-from service.http.routes.forms import constants
+from service.http.routes.form_routes import constants
 from service.http.routes.page import reference
-from service.http.routes.uploads import upload_media
-from service.jobs.registry import Registry
+from service.http.routes.upload_routes import upload_media
+from service.jobs.kind_registry import Registry
 from service.queue.core import Service
 from service.schemas.problems import MEDIA_TYPE, STATUS
 from solver.scene.scene import Scene, load_scene

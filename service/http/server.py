@@ -24,7 +24,7 @@ from service.errors import ConfigurationError
 from service.http.app import create_app
 from service.http.middleware.connections import Connections
 from service.http.openapi import prepare
-from service.jobs.registry import Registry
+from service.jobs.kind_registry import Registry
 from service.queue.core import Service
 from service.settings import logs
 from service.settings.settings import Settings

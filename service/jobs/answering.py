@@ -14,19 +14,19 @@ from typing import Annotated, Any
 from service.errors import BodyTooLargeError, InvalidRequestError, MalformedBodyError, issues_to_json
 from service.jobs.common.measurements import look_at, read_measurements
 from service.jobs.common.scene_parameters import scene_parameters
-from service.jobs.common.scene_text import issues_of_scene, read_text, side_by_side
-from service.jobs.common.scenes import (
+from service.jobs.common.scene_requests import (
     read_scene,
     refers_to_uploads,
     require,
     resolve_scene,
 )
+from service.jobs.common.scene_text import issues_of_scene, read_text, side_by_side
 from service.jobs.common.sizes import memory_limited, work_limited
+from service.jobs.kind_registry import JobRequest, Registry, Resolve, RunOn, SceneSource
 from service.jobs.kinds.bodies import KIND as KIND
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
-from service.jobs.registry import JobRequest, Registry, Resolve, RunOn, SceneSource
 from service.jobs.strict_json import JsonText, digest, encoded
-from service.jobs.studies.plan import Plan
+from service.jobs.studies.plan_study import Plan
 from service.jobs.study import Watch
 from solver.jit.beside import interpret
 

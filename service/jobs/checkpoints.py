@@ -18,9 +18,9 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from service.jobs.figures import StoredArray
+from service.jobs.job_parts import Division, PartOutput
 from service.jobs.outputs import JobOutput, Pace, Progress, ResultPiece, Run, ShouldStop
-from service.jobs.parts import Division, PartOutput
+from service.jobs.stored_figures import StoredArray
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from service.jobs.registry import Json, NothingToDrawError, ReadSweep, Registry, StoredCurve, StoredSweep
+from service.jobs.kind_registry import Json, NothingToDrawError, ReadSweep, Registry, StoredCurve, StoredSweep
 from solver.results.measures import Measured
 from solver.views.plots.curves import Response, above, with_peak
 

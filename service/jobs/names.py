@@ -23,7 +23,7 @@ def home_of(name: str) -> str:
     """The module of a study."""
     if name in _IN_THE_LAB:
         return f"{LAB}.{_IN_THE_LAB[name]}.study"
-    return f"service.jobs.studies.{name.replace('-', '_')}"
+    return f"service.jobs.studies.{name.replace('-', '_')}_study"
 
 
 def there() -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, NamedTuple, Protocol
 
-from service.jobs.figures import (
+from service.jobs.stored_figures import (
     RECORDS,
     STATUS,
     DesignRecord,
@@ -21,7 +21,7 @@ from service.jobs.strict_json import JsonText
 from solver.errors import Issue
 
 Best = Mapping[str, Any]
-"""The best design so far, as JSON (`optim.results.design`)."""
+"""The best design so far, as JSON (`optim.results.design_result`)."""
 Point = tuple[float, float]
 """Value of what is swept and amplitude [m]."""
 OnProgress = Callable[[float, int], None]

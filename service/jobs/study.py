@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 from pydantic import BaseModel, ConfigDict
 
-from service.jobs.common.scenes import (
+from service.jobs.common.scene_requests import (
     CHECKED_BY,
     SCENE,
     HarmonicRequest,
@@ -29,8 +29,7 @@ from service.jobs.common.scenes import (
     resolved,
     stored_scene,
 )
-from service.jobs.names import home_of
-from service.jobs.registry import (
+from service.jobs.kind_registry import (
     JobKind,
     Json,
     KindView,
@@ -41,6 +40,7 @@ from service.jobs.registry import (
     StoredSweep,
     Tell,
 )
+from service.jobs.names import home_of
 from solver.errors import Issue, SettingError
 from solver.results.views import on_demand
 from solver.results.watch import part_of
@@ -48,8 +48,8 @@ from solver.results.watch import part_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from service.jobs.figures import SweepRecord
     from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop
+    from service.jobs.stored_figures import SweepRecord
     from solver.results.dataset import Dataset
     from solver.results.told import Told
     from solver.scene.scene import Scene

@@ -30,15 +30,15 @@ from service.db.repositories import (
     UploadRepository,
 )
 from service.db.repositories.owned import KeyRepository, Projects, StorageRepository, visible
-from service.db.repositories.rows import RunWords
-from service.db.repositories.runs import Runs, Shares
+from service.db.repositories.run_repository import Runs, Shares
+from service.db.repositories.stored_rows import RunWords
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
 from service.jobs import answering
 from service.jobs.answering import Prepared, prepared
-from service.jobs.figures import DESIGN, SWEEP, DesignRecord, SweepRecord
+from service.jobs.kind_registry import ABOUT_THE_RUN, JobKind, JobRequest, Registry
 from service.jobs.kinds.bodies import KIND
 from service.jobs.outputs import OnProgress
-from service.jobs.registry import ABOUT_THE_RUN, JobKind, JobRequest, Registry
+from service.jobs.stored_figures import DESIGN, SWEEP, DesignRecord, SweepRecord
 from service.jobs.strict_json import validated
 from service.queue.elsewhere import Elsewhere
 from service.queue.lanes import Lanes
@@ -51,7 +51,7 @@ from service.settings import traces
 from service.settings.kinds import registry_of
 from service.settings.settings import Settings
 from service.uploads.uploads import Uploads
-from service.workers.answers import Answers
+from service.workers.answer_workers import Answers
 from service.workers.executors import executor_of
 from service.workers.preview_workers import Previews
 from solver.jit import beside

@@ -24,7 +24,7 @@ from service.queue.meters import Meters
 from service.queue.running import Live, Running, StopReason, Waiters
 from service.settings import logs, traces
 from service.settings.settings import Settings
-from service.workers.base import Executor, ExecutorStatus, Failed, Finished, Lost, Outcome, Stopped
+from service.workers.executor import Executor, ExecutorStatus, Failed, Finished, Lost, Outcome, Stopped
 
 log = logging.getLogger("stickslip.queue")
 

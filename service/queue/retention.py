@@ -18,9 +18,9 @@ from functools import partial
 from sqlalchemy.exc import DBAPIError
 
 from service.db.engine import Database, database_name, database_path, is_sqlite, shrink
-from service.db.repositories.jobs import JobRepository
+from service.db.repositories.job_repository import JobRepository
 from service.db.repositories.owned import UploadRepository
-from service.db.repositories.retention import Pruned, RetentionRepository
+from service.db.repositories.retention_repository import Pruned, RetentionRepository
 from service.db.revisions import off_head
 from service.errors import DatabaseError
 from service.settings.settings import Settings

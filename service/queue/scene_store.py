@@ -11,7 +11,7 @@ from service.db.models import NOBODY, StoredScene
 from service.db.pagination import Position
 from service.db.repositories import SceneRepository
 from service.errors import ConflictError, NotFoundError
-from service.jobs.common.scenes import read_scene
+from service.jobs.common.scene_requests import read_scene
 from service.jobs.strict_json import digest, encoded
 from service.uploads.uploads import Uploads
 from solver.scene.scene import load_scene, shipped_scenes
@@ -21,7 +21,7 @@ _BETWEEN = "\n"  # of name and owner where a page ends; neither has one
 
 @dataclass(frozen=True, slots=True)
 class SceneStore:
-    """Scenes by name, as one caller sees them; implements `service.jobs.registry.SceneSource`."""
+    """Scenes by name, as one caller sees them; implements `service.jobs.kind_registry.SceneSource`."""
 
     repository: SceneRepository
     uploads: Uploads

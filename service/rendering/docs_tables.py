@@ -15,25 +15,25 @@ from typing import Any, get_args
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from optim.criteria.criterion_registry import criteria, limit_keys
 from optim.criteria.key import Key, Option
-from optim.criteria.registry import criteria, limit_keys
 from optim.identification.data.measured import data_kinds
-from optim.identification.data.units import known_units
-from optim.identification.readers.registry import data_formats
-from optim.problem.keys import OPTIONS, ROBUST, CaseRequest, DesignKeys, FrontKeys, options
+from optim.identification.data.measured_units import known_units
+from optim.identification.readers.data_readers import data_formats
+from optim.problem.problem_keys import OPTIONS, ROBUST, CaseRequest, DesignKeys, FrontKeys, options
 from optim.problem.words import MethodWord, ScalingWord
-from service.jobs.common.scenes import HarmonicRequest, SceneRequest
+from service.jobs.common.scene_requests import HarmonicRequest, SceneRequest
+from service.jobs.kind_registry import ABOUT_THE_JOB, JobKind, JobRequest, Registry
 from service.jobs.kinds import SHIPPED
-from service.jobs.registry import ABOUT_THE_JOB, JobKind, JobRequest, Registry
-from service.jobs.studies.design import Design
-from service.jobs.studies.pareto import Pareto
+from service.jobs.studies.design_study import Design
+from service.jobs.studies.pareto_study import Pareto
 from service.settings.settings import ClientLimits, Settings
-from solver.contacts.laws.registry import DEFAULT, laws
-from solver.matrices.readers.registry import readers
+from solver.contacts.laws.law_registry import DEFAULT, laws
+from solver.matrices.readers.reader_registry import readers
 
 _HEAD = '''"""The keys of a design problem as keyword arguments, for type checkers: ``**problem: Unpack[…]``.
 
-Written by ``python -m service.rendering.docs_tables`` from `optim.problem.keys`; not to be edited. A key of a
+Written by ``python -m service.rendering.docs_tables`` from `problem_keys`; not to be edited. A key of a
 criterion from outside the package is none of these: pass it in a ``**dict[str, Any]``.
 """
 

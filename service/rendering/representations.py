@@ -11,7 +11,7 @@ from typing import Any
 
 from service.db.repositories import ResultRepository
 from service.errors import NotAcceptableError
-from service.jobs.figures import SweepRecord
+from service.jobs.stored_figures import SweepRecord
 from service.jobs.strict_json import digest
 from service.schemas.answers import SweepDetail
 from solver.results.dataset import Dataset

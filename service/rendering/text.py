@@ -16,7 +16,7 @@ from solver.results.told import Block, ResultTable, Summary
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from service.jobs.registry import Json, Tell
+    from service.jobs.kind_registry import Json, Tell
 
 _PIPE_WIDTH = 120
 _BOLD, _DIM = "1", "2"

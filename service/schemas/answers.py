@@ -14,8 +14,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service.db.models import JobState, StoredScene
 from service.db.repositories import JobRow, ResultRepository
-from service.jobs.figures import DESIGN, SWEEP, DesignRecord, Quantity, StoredRecord, SweepRecord
 from service.jobs.outputs import AttemptProgress
+from service.jobs.stored_figures import DESIGN, SWEEP, DesignRecord, Quantity, StoredRecord, SweepRecord
 
 if TYPE_CHECKING:
     from service.queue.core import Results, WholeDesign

@@ -8,8 +8,8 @@ from itertools import islice
 from typing import Any
 
 from service.auth.callers import Caller
-from service.db.repositories.runs import RunRow
-from service.jobs.common.scenes import CHECKED_BY
+from service.db.repositories.run_repository import RunRow
+from service.jobs.common.scene_requests import CHECKED_BY
 from service.jobs.strict_json import digest
 from service.queue.core import Service
 from service.schemas.workbench_answers import Comparison, Figure, InputDifference, RunAnswer

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pydantic import Field
 
 from service.schemas.answers import AnswerModel
-from solver.contacts.laws.registry import DEFAULT, laws
+from solver.contacts.laws.law_registry import DEFAULT, laws
 from solver.scene.json_schema import scene_schema
 
 

@@ -15,9 +15,10 @@ from pydantic import ConfigDict, Field, create_model
 from service.db.models import NOBODY
 from service.db.pagination import Range
 from service.db.repositories import ResultRepository
-from service.db.repositories.results import CREATED, Filter
+from service.db.repositories.result_repository import CREATED, Filter
 from service.errors import InvalidRequestError
-from service.jobs.figures import (
+from service.jobs.kind_registry import Registry
+from service.jobs.stored_figures import (
     DESIGN,
     RECORDS,
     SWEEP,
@@ -30,7 +31,6 @@ from service.jobs.figures import (
     quantities_of_model,
     quantities_of_record,
 )
-from service.jobs.registry import Registry
 from service.jobs.strict_json import validated
 from service.schemas.answers import (
     DesignAnswer,

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from service.db.models import JobState
-from service.db.repositories.runs import RunRow
-from service.jobs.figures import SweepRecord
+from service.db.repositories.run_repository import RunRow
+from service.jobs.stored_figures import SweepRecord
 from service.queue.core import Service
 from service.schemas.answers import Peak
 from service.schemas.workbench_answers import RunSummary, SmallCurve

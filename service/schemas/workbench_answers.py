@@ -9,9 +9,9 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import AfterValidator, AwareDatetime, BaseModel, Field
 
 from service.db.models import JobState, Project, Share
-from service.db.repositories.runs import RunFilter, RunRow
+from service.db.repositories.run_repository import RunFilter, RunRow
+from service.jobs.kind_registry import LONGEST_TAG, MOST_TAGS, Notes, ProjectName, RunName, Tags
 from service.jobs.outputs import AttemptProgress
-from service.jobs.registry import LONGEST_TAG, MOST_TAGS, Notes, ProjectName, RunName, Tags
 from service.schemas.answers import AnswerModel, JobAnswer, Page, Peak
 from service.schemas.pages import AskedModel, Cursor, Limit, ListQuery
 

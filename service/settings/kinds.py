@@ -12,8 +12,8 @@ import re
 from collections.abc import Iterable
 
 from service.errors import ConfigurationError
+from service.jobs.kind_registry import JobKind, Registry
 from service.jobs.kinds import SHIPPED
-from service.jobs.registry import JobKind, Registry
 from service.jobs.study import Study
 
 _ENTRY = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")

@@ -202,7 +202,7 @@ def limit_process(seconds: float, memory: int, writes: int = 0) -> None:
 
 def _answer(task: str, argument: Any) -> dict[str, Any]:
     from solver.errors import SceneError
-    from solver.matrices.files import MatrixFileError
+    from solver.matrices.matrix_files import MatrixFileError
 
     tasks: dict[str, Callable[[Any], Any]] = {
         _DESCRIBE: lambda names: (_join(*names), _describe(names[0])), _RESOLVE: _resolve, _LOOK: _look,
@@ -220,10 +220,10 @@ def _answer(task: str, argument: Any) -> dict[str, Any]:
 
 
 def _describe(name: str) -> list[dict[str, Any]]:
-    from solver.matrices.files import array_names, read_matrix, read_modes
     from solver.matrices.load_set import labels_of
-    from solver.matrices.readers import registry
-    from solver.matrices.sectors.reduction import read_sector
+    from solver.matrices.matrix_files import array_names, read_matrix, read_modes
+    from solver.matrices.readers import reader_registry as registry
+    from solver.matrices.sectors.sector_reduction import read_sector
 
     file = Path(name)
     _refuse_inflating(file)
@@ -263,7 +263,7 @@ def _join(name: str, *parts: str) -> str | None:
 
 def _refuse_inflating(file: Path) -> None:
     """Refuse an archive that holds far more than it is."""
-    from solver.matrices.files import MatrixFileError
+    from solver.matrices.matrix_files import MatrixFileError
 
     if not zipfile.is_zipfile(file):
         return

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from solver.matrices.load_set import MatrixSet
     from solver.matrices.reduction.craig_bampton import Reduced
-    from solver.matrices.sectors.reduction import ReducedSector
+    from solver.matrices.sectors.sector_reduction import ReducedSector
     from solver.scene.scene import Scene
 
 MOST_LABELS = 400
@@ -44,8 +44,8 @@ def look(asked: Mapping[str, Any]) -> dict[str, Any]:
         With pointers into the scene that is asked for.
     """
     from service.uploads.sector_summary import deck_of, reduced_sector
-    from solver.matrices.files import read_modes
     from solver.matrices.load_set import MatrixSet
+    from solver.matrices.matrix_files import read_modes
 
     structure = dict(asked["structure"] or _sorted(asked["files"]))
     report: dict[str, Any] = {"structure": structure, "notes": [], "sets": deck_of(structure)}
@@ -72,7 +72,7 @@ def look(asked: Mapping[str, Any]) -> dict[str, Any]:
 
 def _sorted(files: list[str]) -> dict[str, Any]:
     from service.uploads.sector_summary import told_apart
-    from solver.matrices.files import sorted_files
+    from solver.matrices.matrix_files import sorted_files
 
     rest, found = told_apart(files)
     if "diameters" in found:
@@ -257,8 +257,8 @@ def started(asked: Mapping[str, Any], structure: Mapping[str, Any]) -> tuple[Sce
     from solver.linear.assembly import linear_model
     from solver.matrices.diagnostics import rigid_body_modes
     from solver.matrices.normal_modes import undamped_modes
-    from solver.scene.parts import MatricesStructure
     from solver.scene.scene import Scene
+    from solver.scene.scene_records import MatricesStructure
 
     given = {key: value for key, value in asked["excitation"].items() if value is not None}
     raw = {

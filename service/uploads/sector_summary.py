@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from solver.errors import SceneError, Shown
 
 if TYPE_CHECKING:
-    from solver.matrices.sectors.reduction import ReducedSector
+    from solver.matrices.sectors.sector_reduction import ReducedSector
 
 MOST_SETS = 400
 _NODES = ("structure", "cyclic", "nodes")
@@ -27,8 +27,8 @@ def told_apart(files: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
     SceneError
         More than one deck.
     """
-    from solver.matrices.files import array_names
-    from solver.matrices.readers import registry
+    from solver.matrices.matrix_files import array_names
+    from solver.matrices.readers import reader_registry as registry
 
     decks = [name for name in files if Path(name).suffix.lower() in registry.suffixes("nodes")]
     if len(decks) > 1:
@@ -75,8 +75,8 @@ def reduced_sector(structure: Mapping[str, Any]) -> dict[str, Any]:
     SceneError
         It is none.
     """
-    from solver.matrices.files import MatrixFileError
-    from solver.matrices.sectors.reduction import read_sector
+    from solver.matrices.matrix_files import MatrixFileError
+    from solver.matrices.sectors.sector_reduction import read_sector
 
     try:
         found, was, _ = read_sector(Path(structure["diameters"]))

@@ -15,7 +15,7 @@ from service.auth.callers import KEYLESS, Caller
 from service.db.models import Upload
 from service.db.repositories.owned import UploadRepository, visible
 from service.errors import InvalidRequestError, NotFoundError, UnreadableUploadError
-from service.jobs.common.scenes import UPLOAD, Place, named_files, with_named
+from service.jobs.common.scene_requests import UPLOAD, Place, named_files, with_named
 from service.jobs.strict_json import digest, encoded
 from service.settings.settings import Settings
 from service.uploads.inspection import contents, look_at, resolved_structure
@@ -39,7 +39,7 @@ def format_of(asked: str | None, name: str, content_type: str) -> str:
     InvalidRequestError
         If none of them says it, or no reader has the word.
     """
-    from solver.matrices.readers import registry
+    from solver.matrices.readers import reader_registry as registry
 
     known = (*registry.words(), PART)
     found = registry.word_of(name, content_type) if asked is None else asked
@@ -247,7 +247,7 @@ def file_names(rows: Mapping[Place, Upload]) -> dict[Place, str]:
 
 def file_name(name: str, form: str) -> str:
     """The name an upload came with, with an ending of its format."""
-    from solver.matrices.readers import registry
+    from solver.matrices.readers import reader_registry as registry
 
     return name if registry.word_of(name, "") == form else f"{name}.{form}"
 

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from ctypes import Array
 from multiprocessing.connection import Connection
 
+from service.jobs.kind_registry import RunOn, WarmUp
 from service.jobs.outputs import Pace
-from service.jobs.registry import RunOn, WarmUp
 from service.workers.process_limits import ProcessLimits
 from service.workers.processes import Process, start
 from service.workers.worker import Orders, main

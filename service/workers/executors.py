@@ -8,10 +8,10 @@ from collections.abc import Mapping
 
 from service.db.repositories import Attempt
 from service.errors import ConfigurationError
+from service.jobs.kind_registry import Registry, RunOn, WarmUp
 from service.jobs.outputs import Pace
-from service.jobs.registry import Registry, RunOn, WarmUp
 from service.settings.settings import Settings
-from service.workers.base import Executor, ExecutorStatus, Sink, Stopped
+from service.workers.executor import Executor, ExecutorStatus, Sink, Stopped
 from service.workers.process_limits import UNLIMITED, ProcessLimits
 from service.workers.slot import LentBatch, Slot
 from solver.lab import from_lab

@@ -19,10 +19,10 @@ from service.errors import (
     QueueFullError,
     TooManyRequestsError,
 )
+from service.jobs.kind_registry import Registry
 from service.jobs.kinds.previews import PREVIEWS
 from service.jobs.outputs import FailureKind
-from service.jobs.registry import Registry
-from service.workers.base import Failed, Finished, Lost, Outcome
+from service.workers.executor import Failed, Finished, Lost, Outcome
 from service.workers.process_limits import ProcessLimits
 from service.workers.warm_pool import WarmPool, WarmTask
 from solver.errors import Issue

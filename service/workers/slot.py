@@ -16,10 +16,10 @@ from typing import Protocol
 
 from service.db.repositories import Attempt
 from service.jobs.checkpoints import KeptPieces
+from service.jobs.kind_registry import RunOn, WarmUp
 from service.jobs.outputs import Pace
-from service.jobs.registry import RunOn, WarmUp
-from service.workers.base import Failed, Finished, Lost, Outcome, Sink, Stopped
 from service.workers.child import Child, death, ending_signal
+from service.workers.executor import Failed, Finished, Lost, Outcome, Sink, Stopped
 from service.workers.process_limits import ProcessLimits
 from service.workers.processes import Process
 from service.workers.worker import (

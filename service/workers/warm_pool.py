@@ -13,9 +13,9 @@ from typing import Any
 
 from service.db.clock import new_id, utc_now
 from service.db.repositories import Attempt
+from service.jobs.kind_registry import RunOn, WarmUp
 from service.jobs.outputs import Pace
-from service.jobs.registry import RunOn, WarmUp
-from service.workers.base import Outcome, Stopped, Unwatched
+from service.workers.executor import Outcome, Stopped, Unwatched
 from service.workers.executors import LocalExecutor
 from service.workers.process_limits import ProcessLimits
 from solver.jit.beside import missing

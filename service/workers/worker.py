@@ -26,9 +26,9 @@ from typing import Any
 from service.errors import UnknownKindError
 from service.jobs import strict_json
 from service.jobs.checkpoints import Checkpoints, KeptPieces
-from service.jobs.figures import alone, figures
+from service.jobs.kind_registry import RunOn, WarmUp
 from service.jobs.outputs import Best, FailureKind, JobFailure, JobOutput, Pace, Point, ResultPiece
-from service.jobs.registry import RunOn, WarmUp
+from service.jobs.stored_figures import alone, figures
 from service.settings import logs, traces
 from service.workers.process_limits import ProcessLimits
 from service.workers.spreading import BatchAnswer, Spreading, helped

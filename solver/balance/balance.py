@@ -20,9 +20,9 @@ from solver.linear.condensation import reduce_model
 from solver.linear.contact_table import contact_set, highest_load, port_stiffnesses
 from solver.scene.bodies.kinematics import static_forces
 from solver.scene.cyclic.annulus import check_in_annulus, written_out
-from solver.scene.harmonics import MOST_HARMONICS, forced_harmonics, kept_harmonics
 from solver.scene.parameter_paths import AMPLITUDE
 from solver.scene.scene import Scene
+from solver.scene.scene_harmonics import MOST_HARMONICS, forced_harmonics, kept_harmonics
 from solver.wording import listing
 
 
@@ -37,7 +37,7 @@ class Balance:
         int,
         "Highest harmonic asked for. The system keeps `system.ks`: these, or the odd ones of them, and "
         "those that forces and loads call for whatever was asked, see "
-        "`solver.scene.harmonics.kept_harmonics`.",
+        "`solver.scene.scene_harmonics.kept_harmonics`.",
     ]
     effects: Annotated[Effects, "What is paid for though the scene does not call for it."]
     sizes: Annotated[
@@ -86,7 +86,7 @@ def build(
     scene : the scene, with the values that stay fixed.
     path : the parameter that λ is.
     harmonics : highest harmonic asked for; all from 0 on are kept, or the odd ones where the others are zero,
-        and those that forces and loads call for, see `solver.scene.harmonics.kept_harmonics`.
+        and those that forces and loads call for, see `solver.scene.scene_harmonics.kept_harmonics`.
     frequency_hz : the excitation frequency [Hz], needed unless λ is the frequency.
     effects : what is paid for though the scene does not call for it.
     poles : damping that couples the modes may be carried by poles; otherwise matrices are kept where it does.

@@ -16,7 +16,7 @@ from solver.balance.parameter import Parameter
 from solver.contacts.kernels.laws import law_force, law_second
 from solver.contacts.kernels.stick_slip_events import FAILED, new_segments
 from solver.contacts.kernels.system import System
-from solver.contacts.laws.base import without_second
+from solver.contacts.laws.contact_law import without_second
 from solver.contacts.load_derivatives import contradicting
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Integer, Real, coefficient_count

@@ -18,7 +18,7 @@ from solver.balance.balance import Balance
 from solver.balance.kernels.residual import contact_values
 from solver.contacts.kernels.columns import MU, N0, PRESTRESSED
 from solver.contacts.kernels.system import Receptance, System, receptance_by_value
-from solver.contacts.laws.parts import Slider
+from solver.contacts.laws.contact_parts import Slider
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance

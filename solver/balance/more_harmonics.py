@@ -13,7 +13,7 @@ from solver.contacts.kernels.columns import NODES
 from solver.contacts.kernels.system import DENSE, System
 from solver.jit.fourier import Complex, Integer, Real
 from solver.jit.trig_polynomial import grid_size, grid_tables
-from solver.scene.harmonics import MULTIPLES, among, kept_harmonics, spread
+from solver.scene.scene_harmonics import MULTIPLES, among, kept_harmonics, spread
 
 
 def more_harmonics(balance: Balance, top: int, *, multiples: int = MULTIPLES) -> Balance:

@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 
 from solver.contacts.kernels.columns import N0
-from solver.contacts.laws.harmonics import is_of_variation
+from solver.contacts.laws.load_harmonics import is_of_variation
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
 from solver.linear.contact_table import contact_table

@@ -35,7 +35,7 @@ from solver.contacts.kernels.system import (
 )
 from solver.jit.fourier import Integer, Real, coefficient_count
 from solver.linear.kernels.receptance import receptance
-from solver.scene.harmonics import spread
+from solver.scene.scene_harmonics import spread
 
 # The mean and the first: with these Newton's method from full stick nearly always ends well.
 FEWEST_HARMONICS = 2

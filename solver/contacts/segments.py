@@ -9,7 +9,7 @@ import numpy as np
 
 from solver.contacts.kernels.state_durations import find_segments
 from solver.contacts.kernels.stick_slip_events import AFTER_SLIP, SLIP, UNLOADED, new_segments
-from solver.contacts.laws.parts import ContactMotion
+from solver.contacts.laws.contact_parts import ContactMotion
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.jit.trig_polynomial import grid_size, grid_tables

@@ -1,6 +1,6 @@
 """What a contact with a circular limit does over a period: its force and the shares of its motions.
 
-From the sticks and slips with their exact ends that `solver.contacts.kernels.circle.state` finds: the
+From the sticks and slips with their exact ends that `solver.contacts.kernels.circle.circle_state` finds: the
 force of a stick is that at its begin and the motion since then; in a slip it lies on the circle μN, in the
 direction of the collocation polynomial.
 """
@@ -12,16 +12,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver.contacts.kernels.circle.law import whole_path
+from solver.contacts.kernels.circle.circle_law import whole_path
+from solver.contacts.kernels.circle.circle_state import FOUND, SETTLES
 from solver.contacts.kernels.circle.radau import between
-from solver.contacts.kernels.circle.state import FOUND, SETTLES
 from solver.contacts.kernels.columns import COLUMNS, KT, KT_SECOND, MU
 from solver.contacts.kernels.stick_slip_events import FAILED, SEPARATED, SLIP
 from solver.contacts.segments import Shares
 from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Real
-from solver.jit.records import Row
+from solver.jit.kernel_records import Row
 from solver.jit.trig_polynomial import grid_size, grid_tables
 
 _TURN = 2.0 * math.pi

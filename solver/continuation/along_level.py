@@ -20,12 +20,12 @@ from solver.balance.balance import Balance, build, level_scales_all
 from solver.balance.parameter import Kind
 from solver.balance.workspace import PointSolution, Workspace
 from solver.continuation.branch import BranchStatus
+from solver.continuation.continuation_settings import ContinuationSettings
 from solver.continuation.kernels.pseudo_arclength import begin_walk
-from solver.continuation.settings import ContinuationSettings
 from solver.continuation.stretches import STRETCH, BranchStretches, control_of
 from solver.continuation.walk import walk
-from solver.jit.clock import clock
 from solver.jit.fourier import Real
+from solver.jit.timer import clock
 from solver.scene.parameter_paths import AMPLITUDE
 
 LOWEST = 1e-3  # level to begin with, relative to the one given

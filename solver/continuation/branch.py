@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Protocol
 import numpy as np
 
 from solver.arrays import FloatOrNaN, Integer, Real
-from solver.continuation.certificate import PeakCertificate
-from solver.continuation.peaks import Band, Peak
+from solver.continuation.peak import Band, Peak
+from solver.continuation.peak_certificate import PeakCertificate
 from solver.results.base import Drawn
 from solver.results.known import Known, Stable, Verdict
 from solver.results.notes import NOTHING_DAMPS, Note
@@ -356,7 +356,7 @@ class Branch(AnyBranch):
     @property
     def known(self) -> Known:
         """By the error estimate and the flags of the highest peak."""
-        found: Known = on_demand("solver.response.known:known_of")(self)
+        found: Known = on_demand("solver.response.known_of_response:known_of")(self)
         return found
 
     @property

@@ -9,9 +9,9 @@ from solver.balance.rounding import amplitudes
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import KT
 from solver.contacts.kernels.system import evaluation_by_value
-from solver.continuation.kernels import state as walk_states
+from solver.continuation.kernels import walk_state as walk_states
 from solver.continuation.kernels.pseudo_arclength import begin_walk
-from solver.continuation.kernels.state import Control, walk_by_value
+from solver.continuation.kernels.walk_state import Control, walk_by_value
 from solver.jit.fourier import Real
 from solver.linear.modal import undamped_resonance
 

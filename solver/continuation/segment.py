@@ -17,7 +17,7 @@ from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import AT_BRANCH_POINT, evaluation_by_value
 from solver.continuation.branch import ROWS, BranchStatus, Points
 from solver.continuation.kernels.pseudo_arclength import begin_walk
-from solver.continuation.kernels.state import (
+from solver.continuation.kernels.walk_state import (
     COUNT,
     ITERATIONS,
     NUMBERS,

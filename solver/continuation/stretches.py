@@ -15,14 +15,14 @@ from solver.balance.kernels.mechanics import ALLOWED
 from solver.balance.kernels.output import LOST
 from solver.balance.workspace import PointSolution, Workspace
 from solver.continuation.branch import BranchStatus
+from solver.continuation.continuation_settings import ContinuationSettings
 from solver.continuation.endings import MANY, ratchets_ahead, stands_still, taken_up
-from solver.continuation.kernels import state as walk_states
+from solver.continuation.kernels import walk_state as walk_states
 from solver.continuation.kernels.pseudo_arclength import walk_on
-from solver.continuation.kernels.state import Control, Walk, walk_by_value
+from solver.continuation.kernels.walk_state import Control, Walk, walk_by_value
 from solver.continuation.segment import Stretch, rows_of, state_of
-from solver.continuation.settings import ContinuationSettings
 from solver.continuation.walk import Curve
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 
 STRETCH = 64  # points between two looks at the caller, at most
 _SHORT_STRETCH = 4  # the first of them where a point may take long

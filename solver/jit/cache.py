@@ -23,8 +23,8 @@ import llvmlite.binding
 from numba.core import caching, event
 from numba.core.runtime import rtsys
 
-from solver.jit.clock import took
 from solver.jit.folder import folder
+from solver.jit.timer import took
 
 try:
     import fcntl

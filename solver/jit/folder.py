@@ -14,7 +14,7 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-_NO_CODE = ("beside", "clock", "folder", "interpreted", "lapack_loading", "parallel", "shipped", "way")
+_NO_CODE = ("beside", "timer", "folder", "interpreted", "lapack_loading", "parallel", "shipped", "way")
 """Modules of this folder that the machine code does not depend on."""
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any, TypeVar
 
-from solver.jit.forms import Form
+from solver.jit.kernel_forms import Form
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -52,7 +52,7 @@ class Kernels:
 
 
 def numbered(arguments: tuple[Form, ...], result: Form, known: tuple[str, ...] = ()) -> Any:
-    """Make the function it decorates the contract of kernels called by number, see `solver.jit.tables`."""
+    """Make the function it decorates the contract of kernels called by number, see `kernel_tables`."""
     del arguments, result  # Python asks for no types
     return lambda _function: Kernels(known)
 

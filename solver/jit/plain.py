@@ -12,8 +12,8 @@ from typing import Any, TypeVar
 import numba
 from numba import types
 
-from solver.jit.forms import Form, of_numba
 from solver.jit.interpreted import Kernels
+from solver.jit.kernel_forms import Form, of_numba
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 FASTMATH = {"reassoc", "contract"}
@@ -26,7 +26,7 @@ def apart(function: _Function) -> _Function:
 
 
 def numbered(arguments: tuple[Form, ...], result: Form, known: tuple[str, ...] = ()) -> Any:
-    """Make the function it decorates the contract of kernels called by number, see `solver.jit.tables`."""
+    """Make the function it decorates the contract of kernels called by number, see `kernel_tables`."""
     del arguments
     kernels, returned = Kernels(known), of_numba(result)
     by_number = kernels.call

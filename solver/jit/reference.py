@@ -24,7 +24,7 @@ def referenced(name: str, module: str, fields: Iterable[str], *seen_as: type) ->
         return type(f"_{name}Reference", (*seen_as, Referenced), {"__module__": module, "_fields": fields})
     from numba.experimental import structref
 
-    from solver.jit.structure import Structure
+    from solver.jit.kernel_structure import Structure
 
     kind = type(f"_{name}Type", (Structure,), {"__module__": module})
     setattr(sys.modules[module], kind.__name__, structref.register(kind))

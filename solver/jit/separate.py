@@ -1,4 +1,4 @@
-"""Kernels compiled on their own (`solver.jit.slots`), or called by numbers (`solver.jit.tables`).
+"""Kernels compiled on their own (`solver.jit.slots`), or called by numbers (`solver.jit.kernel_tables`).
 
 In the plain way the first are as all others, and Python calls the second; interpreted, all are Python.
 """
@@ -8,8 +8,8 @@ from __future__ import annotations
 from solver.jit.way import WAY, Way
 
 if WAY is Way.COMPILED:
+    from solver.jit.kernel_tables import numbered
     from solver.jit.slots import apart
-    from solver.jit.tables import numbered
 elif WAY is Way.PLAIN:
     from solver.jit.plain import apart, numbered
 else:

@@ -19,7 +19,7 @@ from solver.matrices.normal_modes import hermitian
 from solver.matrices.values import frozen
 from solver.scene.bodies.body import Body
 from solver.scene.cyclic.sector_blocks import at_diameter, full_elimination
-from solver.scene.parts import MatricesStructure
+from solver.scene.scene_records import MatricesStructure
 
 Matrices = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
 _NO_PROPORTIONAL = {"stiffness_proportional_damping": 0.0, "mass_proportional_damping": 0.0}

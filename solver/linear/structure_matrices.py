@@ -16,7 +16,7 @@ from solver.matrices.values import frozen
 from solver.scene.bodies.body import Body
 from solver.scene.bodies.kinematics import dof_names
 from solver.scene.matrices_structure import Ratios
-from solver.scene.parts import CyclicStructure, LumpedStructure
+from solver.scene.scene_records import CyclicStructure, LumpedStructure
 
 FloatArray = NDArray[np.float64]
 _SAME = 1e-9  # relative distance of two squared frequencies below which their quotient is a derivative

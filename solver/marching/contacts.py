@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
-from solver.contacts.laws.base import AnyContact
-from solver.contacts.laws.parts import Row
-from solver.marching.kernels.state import SparseRows, steady
+from solver.contacts.laws.contact_law import AnyContact
+from solver.contacts.laws.contact_parts import Row
+from solver.marching.kernels.march_state import SparseRows, steady
 from solver.scene.bodies.kinematics import Form
 
 
@@ -26,7 +26,7 @@ def rows(contacts: tuple[AnyContact, ...]) -> tuple[Row, ...]:
 
 
 def columns(placed: Sequence[tuple[Row, tuple[Form, ...]]], index: dict[str, int], n: int) -> dict[str, Any]:
-    """Return the arrays of `solver.marching.kernels.state.System` that belong to the contacts.
+    """Return the arrays of `solver.marching.kernels.march_state.System` that belong to the contacts.
 
     Parameters
     ----------

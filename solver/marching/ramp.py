@@ -18,11 +18,11 @@ from scipy.sparse import csr_array
 
 from solver.arrays import Real
 from solver.errors import SettingError
-from solver.marching.base import base_over
 from solver.marching.contacts import as_sparse
-from solver.marching.equations import MarchEquations, equations_of_motion
-from solver.marching.kernels import state as kernel
+from solver.marching.kernels import march_state as kernel
 from solver.marching.march import whole
+from solver.marching.march_base import base_over
+from solver.marching.march_equations import MarchEquations, equations_of_motion
 from solver.scene.scene import Scene
 
 _POWERS = np.array([[1.0, 0.0, 0.0], [-3.0, 4.0, -1.0], [2.0, -4.0, 2.0]])

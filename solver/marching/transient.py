@@ -16,16 +16,16 @@ import numpy as np
 
 from solver import arrays
 from solver.errors import SettingError
-from solver.jit.clock import clock
-from solver.marching.base import base_begins
-from solver.marching.equations import MarchEquations, equations_of_motion
-from solver.marching.kernels import state as kernel
+from solver.jit.timer import clock
+from solver.marching.kernels import march_state as kernel
 from solver.marching.kernels import taylor as stepping
 from solver.marching.march import RESOLVED, copied, order_of, row_names, settled_state, steps_for, whole
-from solver.marching.modal import in_modes, moved_to
+from solver.marching.march_base import base_begins
+from solver.marching.march_equations import MarchEquations, equations_of_motion
+from solver.marching.march_modal import in_modes, moved_to
+from solver.marching.march_result import MarchStatus, turning_points
+from solver.marching.march_start import MarchStart, state_at
 from solver.marching.ramp import Ramp, check, equations_over
-from solver.marching.result import MarchStatus, turning_points
-from solver.marching.start import MarchStart, state_at
 from solver.marching.transient_result import TransientResult, TransientStatus
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.parameter_paths import check_frequency

@@ -12,8 +12,8 @@ from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
 from solver.errors import FieldError
 from solver.matrices.load_set import MatrixSet
+from solver.matrices.matrix_validation import one_triangle
 from solver.matrices.sectors.elimination import Elimination
-from solver.matrices.validation import one_triangle
 from solver.matrices.values import ASYMMETRY
 
 FloatArray = NDArray[np.float64]

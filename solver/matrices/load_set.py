@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 
-from solver.matrices.files import MatrixFileError, labels_beside, read_labelled, read_labels
 from solver.matrices.labels import Label
 from solver.matrices.labels import label as parsed
-from solver.matrices.readers.arrays import Labelled
+from solver.matrices.matrix_files import MatrixFileError, labels_beside, read_labelled, read_labels
+from solver.matrices.readers.array_parts import Labelled
 from solver.matrices.readers.numbers_in_text import FormatError
-from solver.matrices.readers.registry import reader_of, suffixes
+from solver.matrices.readers.reader_registry import reader_of, suffixes
 from solver.matrices.values import UNITS
 
 if TYPE_CHECKING:

@@ -15,9 +15,9 @@ import numpy as np
 from solver.continuation.between import closing_in
 from solver.jit.fourier import Real
 from solver.modes.corrector import Corrected, ModeState, carried_as, correct
-from solver.modes.curve import BENT, border_of, by_shape, is_near, tangent_of
-from solver.modes.equations import Equations
-from solver.modes.results import NonlinearMode
+from solver.modes.mode_curve import BENT, border_of, by_shape, is_near, tangent_of
+from solver.modes.mode_equations import Equations
+from solver.modes.mode_results import NonlinearMode
 
 _CLOSE = 1e-14  # of the share of a way
 _SHARES = (0.25, 0.5, 0.75)  # where a way is looked at that may hold what is looked for

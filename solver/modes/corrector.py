@@ -9,8 +9,8 @@ from typing import Annotated
 import numpy as np
 
 from solver.jit.fourier import Complex, Real
-from solver.modes.equations import Equations, Evaluated
-from solver.modes.kernels.assembly import relative_residual as relative
+from solver.modes.kernels.mode_assembly import relative_residual as relative
+from solver.modes.mode_equations import Equations, Evaluated
 
 TOLERANCE = 1e-9  # of motions relative to the largest, and of the equations beside them
 _FINE = 1e-13  # below it nothing is left but rounding; between the two, steps go on as long as they help
@@ -24,7 +24,7 @@ _PATIENCE, _HOPE = 8, 0.9  # Newton steps along an arc within which the residual
 class ModeState:
     """A point of a nonlinear mode."""
 
-    y: Annotated[Real, "(m,) unknowns of `solver.modes.equations`."]
+    y: Annotated[Real, "(m,) unknowns of `solver.modes.mode_equations`."]
     log_amplitude: Annotated[float, "Ln a."]
     mode: Annotated[int, "Number of the mode of the structure that is carried in q."]
     phase: Annotated[Complex, "(N,) the force that harmonic 1 lags by a quarter of a period."]

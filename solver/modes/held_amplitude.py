@@ -9,7 +9,7 @@ The equations are those of the balance under the force z c f, with z as one more
 
     ln (|o x_1| / A) = 0,   ln ω − λ = 0,                     o the row of the DOF,
 
-in place of phase and modal amplitude (`solver.modes.equations`); the curve is followed over λ = ln ω. In
+in place of phase and modal amplitude (`solver.modes.mode_equations`); the curve is followed over λ = ln ω. In
 place of |o x_1| it may be max|x| of the DOF that is held.
 """
 
@@ -25,9 +25,9 @@ from solver.balance.balance import Balance
 from solver.continuation.between import least_between
 from solver.jit.fourier import Complex, Real, cosine_position
 from solver.modes.corrector import Corrected, ModeState, correct
-from solver.modes.equations import Evaluated, Forced
-from solver.modes.start import slopes_at_rest
-from solver.modes.structure import Dynamics
+from solver.modes.mode_equations import Evaluated, Forced
+from solver.modes.mode_start import slopes_at_rest
+from solver.modes.mode_structure import Dynamics
 
 _RUNGS = 24  # of amplitude, each `_RISE` times the one before, from which a start is walked up
 _RISE = 1.6

@@ -12,14 +12,14 @@ import numpy as np
 from solver.balance.balance import Balance, build, check_harmonics
 from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.errors import SettingError, check_count
-from solver.jit.clock import clock
 from solver.jit.fourier import Real
+from solver.jit.timer import clock
 from solver.linear.assembly import linear_model
-from solver.modes.curve import follow
-from solver.modes.equations import Equations
-from solver.modes.records import collect
-from solver.modes.results import NonlinearMode
-from solver.modes.start import LinearMode, begin, damped_mode, equilibrium, linear_modes, slopes_at_rest
+from solver.modes.mode_curve import follow
+from solver.modes.mode_equations import Equations
+from solver.modes.mode_records import collect
+from solver.modes.mode_results import NonlinearMode
+from solver.modes.mode_start import LinearMode, begin, damped_mode, equilibrium, linear_modes, slopes_at_rest
 from solver.results.watch import shows_progress
 from solver.scene.cyclic.annulus import written_out
 

@@ -164,7 +164,7 @@ class SparseJacobian:
     ----------
     factors : of Z at the point.
     G : (·, n, n) blocks of the slopes of the contact forces.
-    pushes, rows : (3, nk, N) as in `solver.modes.equations`.
+    pushes, rows : (3, nk, N) as in `solver.modes.mode_equations`.
     """
 
     def __init__(self, layout: Layout, factors: Factors, G: Real, pushes: Complex, rows: Complex) -> None:

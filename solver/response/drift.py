@@ -23,7 +23,7 @@ from solver.balance.whole_motion import Amplitudes
 from solver.balance.workspace import ALONG, PointSolution, Workspace
 from solver.contacts.kernels.columns import PRESTRESSED
 from solver.contacts.kernels.system import UNHELD
-from solver.contacts.laws.parts import Slider
+from solver.contacts.laws.contact_parts import Slider
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Integer, Real
 from solver.jit.separate import apart

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import numpy as np
 
-from solver.contacts.laws.parts import Slider
+from solver.contacts.laws.contact_parts import Slider
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.linear.contact_table import port_counts

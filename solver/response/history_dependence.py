@@ -35,7 +35,7 @@ from typing import Annotated
 import numpy as np
 
 from solver.balance.workspace import Workspace
-from solver.contacts.laws.parts import Slider
+from solver.contacts.laws.contact_parts import Slider
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model

@@ -95,7 +95,7 @@ class Solution(Drawn):
     harmonics: Annotated[
         Real,
         "|mean| and the amplitude of each harmonic of the observed DOF [m], up to the highest one kept: "
-        "that is above `n_harmonics` where a force is, see `solver.scene.harmonics.kept_harmonics`. Zero "
+        "that is above `n_harmonics` where a force is, see `kept_harmonics`. Zero "
         "if not kept. (H + 1,).",
     ]
     observed: Annotated[Real, "Its coefficients [m], (2H + 1,)."]

@@ -22,8 +22,8 @@ from solver.continuation.branches.symmetry_breaking import assumed_flags, seen
 from solver.continuation.extrema.error_estimate import UNKNOWN, truncation_error
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.jit import fourier
-from solver.jit.clock import clock
 from solver.jit.fourier import Real
+from solver.jit.timer import clock
 from solver.lab import from_lab
 from solver.linear.condensation import loose_ports
 from solver.linear.modal import undamped_resonance

@@ -28,11 +28,11 @@ from solver.balance.parameter import Kind
 from solver.balance.workspace import PointSolution, Workspace
 from solver.contacts.kernels.columns import MU
 from solver.continuation.branch import Branch
-from solver.continuation.peaks import Peak
+from solver.continuation.peak import Peak
 from solver.errors import SettingError
 from solver.jit import fourier
-from solver.jit.clock import clock
 from solver.jit.fourier import Real
+from solver.jit.timer import clock
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.model import LinearModel
 from solver.response.contact_response import ContactState, code_of, contact_responses

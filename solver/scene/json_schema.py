@@ -15,16 +15,16 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from solver.contacts.laws import harmonics as load_harmonics
-from solver.contacts.laws.base import AnyContact
-from solver.contacts.laws.registry import laws
+from solver.contacts.laws import load_harmonics as load_harmonics
+from solver.contacts.laws.contact_law import AnyContact
+from solver.contacts.laws.law_registry import laws
 from solver.matrices.values import UNITS
 from solver.scene import linear_terms, materials
 from solver.scene import matrices_structure as matrices_part
-from solver.scene import parts as scene_parts
+from solver.scene import scene_records as scene_parts
 from solver.scene.bodies import body as scene_bodies
-from solver.scene.bodies import shapes as scene_shapes
-from solver.scene.bodies.validation import further_ends
+from solver.scene.bodies import body_shapes as scene_shapes
+from solver.scene.bodies.body_validation import further_ends
 from solver.scene.descriptions import EXAMPLES, WORDS
 from solver.scene.scene import Scene
 from solver.wording import every_field_said

@@ -29,7 +29,7 @@ from solver.extensions import Kinds
 from solver.matrices.values import ByContent, Matrix, differs
 
 if TYPE_CHECKING:
-    from solver.scene.parts import Structure
+    from solver.scene.scene_records import Structure
 
 Offset = Annotated[int, Field(strict=True, ge=-10_000, le=10_000)]
 _ROUNDING = 1e-14  # of the largest coefficient: less is what a Fourier transform leaves

@@ -7,10 +7,10 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from solver.contacts.fields import NonNegative, Part, Vector
+from solver.matrices.matrix_validation import DofTable, antisymmetric, check_matrices, symmetric
 from solver.matrices.sectors.diameters import DiameterMatrices
 from solver.matrices.sectors.outline import SectorOutline
-from solver.matrices.sectors.parts import PartMatrices
-from solver.matrices.validation import DofTable, antisymmetric, check_matrices, symmetric
+from solver.matrices.sectors.sector_parts import PartMatrices
 from solver.matrices.values import MOST_MODES, Matrix, NormalModes
 from solver.scene.cyclic.sector_tables import CyclicBoundary, Mistuning, Sectors
 from solver.scene.cyclic.sector_validation import check_sector

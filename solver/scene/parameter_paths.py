@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable, Mapping
 from numbers import Real
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-from solver.contacts.laws.base import AnyContact
-from solver.contacts.laws.parts import LawQuantity
+from solver.contacts.laws.contact_law import AnyContact
+from solver.contacts.laws.contact_parts import LawQuantity
 from solver.errors import SettingError
 from solver.results.units import number
 from solver.scene.bodies import paths as of_bodies
@@ -252,8 +252,8 @@ def _unknown(scene: Scene, path: object, *besides: str) -> SettingError:
 def parameter_unit(path: str) -> str:
     """The unit of the values of a parameter path; empty where there is none, or it depends on the scene."""
     # Loaded here: help and tables of results need no laws.
-    from solver.contacts.laws.harmonics import higher_quantity, order_of
-    from solver.contacts.laws.registry import laws
+    from solver.contacts.laws.law_registry import laws
+    from solver.contacts.laws.load_harmonics import higher_quantity, order_of
 
     units = {FREQUENCY: "Hz", AMPLITUDE: "N", PHASE: "rad"}
     owner, _, key = path.rpartition(".")

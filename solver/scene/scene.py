@@ -16,7 +16,7 @@ from pydantic import (
 )
 
 from solver.contacts.fields import End, Name, NonNegative, Part, Positive, parse_end
-from solver.contacts.laws.base import AnyContact
+from solver.contacts.laws.contact_law import AnyContact
 from solver.contacts.laws.coulomb import Contact
 from solver.contacts.laws.coulomb_2d import PlanarContact
 from solver.contacts.laws.elastic_normal import ElasticNormalContact
@@ -31,11 +31,11 @@ from solver.results.units import number
 from solver.scene import parameter_paths as scene_paths
 from solver.scene.bodies import kinematics
 from solver.scene.bodies.body import Body, Load, Node
+from solver.scene.bodies.body_shapes import AnyShape
+from solver.scene.bodies.body_validation import body_issues
 from solver.scene.bodies.kinematics import Form
 from solver.scene.bodies.shape_parts import own_parts, with_shapes
-from solver.scene.bodies.shapes import AnyShape
-from solver.scene.bodies.validation import body_issues
-from solver.scene.cyclic.validation import cyclic_issues
+from solver.scene.cyclic.cyclic_validation import cyclic_issues
 from solver.scene.excitation import with_factor_files
 from solver.scene.linear_terms import (
     Aerodynamics,
@@ -45,7 +45,7 @@ from solver.scene.linear_terms import (
     at_speed,
 )
 from solver.scene.materials import Material
-from solver.scene.parts import (
+from solver.scene.scene_records import (
     KINDS,
     ContactOfAnyLaw,
     CyclicStructure,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeVar
 from pydantic import ValidationError
 
 from solver.contacts.fields import Part, Real
-from solver.contacts.laws.parts import LawQuantity, Span, usual_span
+from solver.contacts.laws.contact_parts import LawQuantity, Span, usual_span
 from solver.errors import SettingError
 from solver.wording import documented
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 from solver.contacts.fields import LARGEST
 from solver.errors import SettingError
-from solver.scene.parts import Damper, Mass, MatricesStructure, Spring, Structure
 from solver.scene.scene_parameter import SceneParameter, Slope, changed
+from solver.scene.scene_records import Damper, Mass, MatricesStructure, Spring, Structure
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene

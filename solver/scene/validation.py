@@ -14,11 +14,11 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from solver.contacts.fields import GROUND, End, parse_end
-from solver.contacts.laws.harmonics import LoadHarmonic
-from solver.contacts.laws.registry import DEFAULT, laws
+from solver.contacts.laws.law_registry import DEFAULT, laws
+from solver.contacts.laws.load_harmonics import LoadHarmonic
 from solver.errors import Issue, Place, Shown, pointer
 from solver.scene.bodies.body import Body, Load, Node, body_dofs
-from solver.scene.bodies.shapes import SHAPES, WITH_BODY
+from solver.scene.bodies.body_shapes import SHAPES, WITH_BODY
 from solver.scene.cyclic.sector_tables import is_cyclic
 from solver.scene.excitation import PLACES
 from solver.scene.linear_terms import (
@@ -31,7 +31,7 @@ from solver.scene.linear_terms import (
     kind_of,
 )
 from solver.scene.materials import Material, strength_issue
-from solver.scene.parts import (
+from solver.scene.scene_records import (
     KINDS,
     LAW_TAG,
     CyclicBoundary,

@@ -14,7 +14,7 @@ from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.observation import highest_peaks, observing
 from solver.continuation.branches.samples import sampled
 from solver.continuation.branches.sweep import sweep
-from solver.continuation.settings import ContinuationSettings
+from solver.continuation.continuation_settings import ContinuationSettings
 from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Real
@@ -27,8 +27,8 @@ from solver.results.measures import OF_X, Measured
 from solver.results.views import Data, Views
 from solver.results.watch import shows_progress
 from solver.scene.cyclic.annulus import annulus, sectors_needed
-from solver.scene.parts import CyclicStructure, LumpedStructure, Mass, MatricesStructure
 from solver.scene.scene import Scene
+from solver.scene.scene_records import CyclicStructure, LumpedStructure, Mass, MatricesStructure
 from solver.scene.structure_parameters import STRUCTURE, named_parts
 from solver.wording import listing, nearest
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.errors import SettingError
 from solver.marching.contacts import rows
-from solver.marching.start import MarchStart
+from solver.marching.march_start import MarchStart
 from solver.response.solution import Solution
 from solver.response.time_history import motion
 from solver.scene.scene import LumpedStructure

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from solver.errors import SettingError, check_count
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.linear.extra_terms import depends_on_speed
 from solver.linear.natural_frequencies import natural_frequencies
 from solver.modes.nonlinear_mode import at_nodal_diameter

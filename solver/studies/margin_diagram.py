@@ -19,9 +19,9 @@ from solver.balance.balance import check_harmonics
 from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
-from solver.continuation.peaks import Peak
+from solver.continuation.peak import Peak
 from solver.errors import SettingError, at
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.response.worst_mean import WorstMeanSlopes, used_most
 from solver.results.known import Known
 from solver.results.units import STRESS_UNITS

@@ -11,9 +11,9 @@ from solver.balance.simplifications import even_harmonics_reason
 from solver.linear.contact_table import port_counts
 from solver.linear.leading_ports import FEWEST_PORTS, WORTHWHILE
 from solver.scene.cyclic.annulus import sectors_needed
-from solver.scene.harmonics import MULTIPLES, kept_harmonics
-from solver.scene.parts import MatricesStructure
 from solver.scene.scene import Scene
+from solver.scene.scene_harmonics import MULTIPLES, kept_harmonics
+from solver.scene.scene_records import MatricesStructure
 
 _REAL, _COMPLEX = 8, 16
 # Matrices of n x n that are there together while a structure is decomposed: with damping that is diagonal in

@@ -12,11 +12,11 @@ from dataclasses import replace
 
 from solver.continuation.branch import Branch, BranchStatus
 from solver.errors import SettingError, check_count
-from solver.jit.clock import clock
-from solver.response.known import relative_sum
+from solver.jit.timer import clock
+from solver.response.known_of_response import relative_sum
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
-from solver.scene.parts import LumpedStructure, Mistuning
 from solver.scene.scene import Scene
+from solver.scene.scene_records import LumpedStructure, Mistuning
 from solver.studies.blades import BladePeaks, blade_peaks, mistuned, with_mistuning
 from solver.studies.mistuning_result import MistunedDisk, MistuningStatus, MistuningStudy
 

@@ -21,10 +21,10 @@ from solver.response.plausibility import plausibility
 from solver.response.stability.cost import forecast
 from solver.scene.bodies.kinematics import static_forces
 from solver.scene.cyclic.annulus import sectors_needed
-from solver.scene.parts import MatricesStructure
 from solver.scene.scene import (
     Scene,
 )
+from solver.scene.scene_records import MatricesStructure
 from solver.studies.memory import dense_bytes
 from solver.studies.study_results import Effect, Plan
 

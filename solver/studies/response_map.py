@@ -14,18 +14,18 @@ from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.continuation.parameter_scale import Scale, scale_of
 from solver.errors import SettingError, check_count
-from solver.jit.clock import clock
 from solver.jit.fourier import Integer, Real
+from solver.jit.timer import clock
 from solver.response import band_end
-from solver.response.known import known_of_solution
+from solver.response.known_of_response import known_of_solution
 from solver.response.solution import MEAN_UNDETERMINED
 from solver.response.solve import solve
 from solver.results.known import NOTHING_KNOWN, Known
 from solver.results.watch import part_of, shows_progress
 from solver.scene.scene import Scene
 from solver.studies.kernels.map_rows import GIVEN, MAX_ABS, RESIDUAL, ROW_VALUES, SOLVED, solve_row
-from solver.studies.peaks.results import PeakTrack, TrackStatus
 from solver.studies.peaks.track_peak import track_peak
+from solver.studies.peaks.track_results import PeakTrack, TrackStatus
 from solver.studies.peaks.tracker import check_laws
 from solver.studies.study_results import MapStatus, ResponseMap
 

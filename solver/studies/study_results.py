@@ -15,7 +15,7 @@ from solver.results.notes import Note
 from solver.results.told import Piece
 from solver.results.views import Data, Views
 from solver.scene.scene import Scene
-from solver.studies.peaks.results import PeakTrack
+from solver.studies.peaks.track_results import PeakTrack
 
 if TYPE_CHECKING:
     pass

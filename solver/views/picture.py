@@ -19,8 +19,8 @@ from solver.arrays import Real
 from solver.contacts.fields import parse_end
 from solver.contacts.frames import cross, unit
 from solver.scene.bodies.body import Body
+from solver.scene.bodies.body_shapes import Cylinder, Wedge
 from solver.scene.bodies.kinematics import places, point_motion
-from solver.scene.bodies.shapes import Cylinder, Wedge
 from solver.scene.scene import AnyContact, MatricesStructure, Scene
 from solver.views.layout import GROUND, NEXT, Parts, parts_of, places_of
 

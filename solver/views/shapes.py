@@ -21,8 +21,8 @@ from solver.linear.model import LinearModel
 from solver.matrices.sectors.elimination import phase_factor
 from solver.matrices.sectors.outline import SectorOutline
 from solver.matrices.values import Matrix
+from solver.modes.mode_records import diameter_of
 from solver.modes.nonlinear_mode import at_nodal_diameter, pose
-from solver.modes.records import diameter_of
 from solver.response.solution import Solution
 from solver.response.time_history import all_coordinates
 from solver.scene.cyclic.annulus import written_out
@@ -95,7 +95,7 @@ def shape_of_motion(
     Parameters
     ----------
     dofs : names, of one sector or of all.
-    motion : (n,) harmonic 1 of each [1/√kg], see `solver.modes.results.NonlinearMode.shape`.
+    motion : (n,) harmonic 1 of each [1/√kg], see `solver.modes.mode_results.NonlinearMode.shape`.
     frequency_hz, states : what it has there.
     nodal_diameter : of a disk of which one sector was solved; that of the engine order if left out.
 

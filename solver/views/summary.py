@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from solver.modes.peaks.performance import PerformanceCurve
     from solver.response.stability.multipliers import Stability
     from solver.studies.blades import BladeAmplitudes, BladePeaks
-    from solver.studies.peaks.results import LeastPeak
+    from solver.studies.peaks.track_results import LeastPeak
 
 
 def of_performance(curve: PerformanceCurve) -> Iterator[Summary]:

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from solver.contacts.kernels import stick_slip_events as events
-from solver.contacts.kernels.coulomb.force import contact_force
+from solver.contacts.kernels.coulomb.line_force import contact_force
 from solver.contacts.kernels.stick_slip_events import new_segments
 from solver.jit import fourier
 from solver.jit.trig_polynomial import grid_size, grid_tables

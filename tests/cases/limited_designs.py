@@ -16,7 +16,7 @@ from cases.stress_scenes import stressed
 import solver
 from optim.criteria.evaluation import SETTINGS, evaluate
 from optim.problem.cases import LoadCase
-from optim.problem.problem import Problem, pose
+from optim.problem.design_problem import Problem, pose
 from optim.problem.variables import parameter_values
 from solver import Branch, Scene
 from solver.modes.at_amplitudes import mode_at_amplitudes

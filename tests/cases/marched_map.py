@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.contacts.laws.base import AnyContact
+from solver.contacts.laws.contact_law import AnyContact
 from solver.contacts.pieces.piece import StatePiece
 from solver.jit.fourier import basis
-from solver.marching.equations import equations_of_motion
-from solver.marching.kernels import state as kinds
+from solver.marching.kernels import march_state as kinds
 from solver.marching.kernels import taylor as kernel
+from solver.marching.march_equations import equations_of_motion
 from solver.response.solution import Solution
 from solver.response.time_history import all_coordinates
 

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.linalg import eigvalsh
 
 import solver
+from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.evaluation import evaluate, natural_scales
-from optim.criteria.rows import DesignEvaluation
-from optim.problem.problem import Problem, pose
+from optim.problem.design_problem import Problem, pose
 from optim.problem.variables import unscaled
 from solver import Scene
 from solver.linear.assembly import linear_model

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from solver.contacts.kernels.circle.hessian import circle_law_second
-from solver.contacts.kernels.circle.law import coulomb_circle
+from solver.contacts.kernels.circle.circle_hessian import circle_law_second
+from solver.contacts.kernels.circle.circle_law import coulomb_circle
 from solver.contacts.kernels.columns import COLUMNS, KN, KT, KT_SECOND, MU, PRESTRESSED
-from solver.contacts.kernels.coulomb.law import coulomb_box
+from solver.contacts.kernels.coulomb.line_law import coulomb_box
 from solver.contacts.kernels.stick_slip_events import new_segments
 from solver.jit import fourier
 from solver.jit.trig_polynomial import grid_size, grid_tables

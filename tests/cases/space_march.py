@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from solver.contacts.laws.parts import Follows, Row
+from solver.contacts.laws.contact_parts import Follows, Row
 from solver.marching.contacts import columns
-from solver.marching.kernels import state as kernel
+from solver.marching.kernels import march_state as kernel
 from solver.marching.kernels.taylor import run_periods
 from solver.scene.scene_parameter import Term
 

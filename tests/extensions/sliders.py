@@ -11,10 +11,10 @@ import numpy as np
 
 from solver.contacts.fields import Positive, Real
 from solver.contacts.kernels import columns
-from solver.contacts.kernels.coulomb.force import contact_force
+from solver.contacts.kernels.coulomb.line_force import contact_force
 from solver.contacts.kernels.stick_slip_events import FAILED, SLIPPING, STUCK, piece_of
-from solver.contacts.laws.base import AnyContact
-from solver.contacts.laws.parts import LawQuantity, RestStiffness, Row
+from solver.contacts.laws.contact_law import AnyContact
+from solver.contacts.laws.contact_parts import LawQuantity, RestStiffness, Row
 from solver.jit.fourier import Integer
 from solver.jit.lapack import fill_block
 from solver.jit.separate import apart

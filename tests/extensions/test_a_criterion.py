@@ -15,9 +15,9 @@ from rms_amplitude import RMS, WEIGHTS, frequencies
 
 import optim
 import solver
+from optim.criteria.criterion_registry import CRITERIA, criteria, register, unregister
 from optim.criteria.evaluation import evaluate
-from optim.criteria.registry import CRITERIA, criteria, register, unregister
-from optim.problem.problem import pose
+from optim.problem.design_problem import pose
 from service.client.client import Client
 from service.errors import ServiceProblem
 from service.rendering.docs_tables import TABLES, criteria_table

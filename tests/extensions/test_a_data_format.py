@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from optim.errors import DataError
-from optim.identification.data.table import Table
-from optim.identification.readers.registry import DataFormat, Head, table_of
+from optim.identification.data.measured_table import Table
+from optim.identification.readers.data_readers import DataFormat, Head, table_of
 from optim.identification.reading import read_data
 from service.rendering.docs_tables import TABLES
 from solver import extensions

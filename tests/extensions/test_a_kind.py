@@ -26,14 +26,14 @@ from service.client.embedded import EmbeddedService
 from service.db.models import JobState
 from service.errors import ConfigurationError, InvalidRequestError, ServiceProblem
 from service.http.app import create_app
-from service.jobs.common.records import sweep_record
-from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, require, resolve_scene, resolved
+from service.jobs.common.scene_requests import FrequencyHz, HarmonicRequest, require, resolve_scene, resolved
 from service.jobs.common.sizes import balance_issues
-from service.jobs.figures import SweepRecord
+from service.jobs.common.sweep_records import sweep_record
+from service.jobs.job_parts import Division, JobPart, PartOutput
+from service.jobs.kind_registry import JobKind, KindView, PrintedResult, Resolved, SceneSource
 from service.jobs.kinds import SHIPPED
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
-from service.jobs.parts import Division, JobPart, PartOutput
-from service.jobs.registry import JobKind, KindView, PrintedResult, Resolved, SceneSource
+from service.jobs.stored_figures import SweepRecord
 from service.queue.core import Service
 from service.rendering.docs_tables import tables_of_kinds, with_tables
 from service.settings.kinds import registry_of

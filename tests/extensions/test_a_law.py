@@ -21,7 +21,7 @@ from service.client.client import Client
 from service.errors import ServiceProblem
 from service.rendering.docs_tables import TABLES
 from solver.contacts.kernels import columns
-from solver.contacts.laws.registry import laws, register, unregister
+from solver.contacts.laws.law_registry import laws, register, unregister
 from solver.scene.json_schema import scene_schema
 
 HZ, HARMONICS = 0.19, 21

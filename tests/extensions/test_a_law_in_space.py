@@ -17,11 +17,11 @@ import optim
 import solver
 from solver.contacts.fields import Between, Positive, Real
 from solver.contacts.kernels import columns
-from solver.contacts.kernels.coulomb.force import contact_force
+from solver.contacts.kernels.coulomb.line_force import contact_force
 from solver.contacts.kernels.stick_slip_events import FAILED, SLIPPING, STUCK, piece_of
-from solver.contacts.laws.base import AnyContact
-from solver.contacts.laws.parts import Follows, LawQuantity, RestStiffness, Row
-from solver.contacts.laws.registry import register, unregister
+from solver.contacts.laws.contact_law import AnyContact
+from solver.contacts.laws.contact_parts import Follows, LawQuantity, RestStiffness, Row
+from solver.contacts.laws.law_registry import register, unregister
 from solver.contacts.pieces.line import friction_pieces, polynomial_pieces
 from solver.contacts.pieces.piece import ContactPart
 from solver.jit.fourier import Integer

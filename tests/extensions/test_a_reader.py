@@ -15,8 +15,8 @@ from service.cli import main
 from service.client.client import Client
 from service.rendering.docs_tables import formats_table
 from solver import extensions
-from solver.matrices.files import MatrixFileError, read_matrix
-from solver.matrices.readers import registry
+from solver.matrices.matrix_files import MatrixFileError, read_matrix
+from solver.matrices.readers import reader_registry as registry
 from solver.scene.scene import Scene
 
 M = np.diag([0.02, 0.03, 0.04])

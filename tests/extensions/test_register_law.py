@@ -16,8 +16,8 @@ from launch import COMMAND
 import optim
 import solver
 from solver import extensions
-from solver.contacts.laws.base import AnyContact
-from solver.contacts.laws.registry import unregister
+from solver.contacts.laws.contact_law import AnyContact
+from solver.contacts.laws.law_registry import unregister
 from solver.response.solution import SolutionStatus
 
 ROOT = Path(__file__).resolve().parent.parent.parent

@@ -8,13 +8,13 @@ from typing import Annotated, Any, Literal
 import pytest
 from pydantic import Field
 
-from optim.problem.keys import of_front
+from optim.problem.problem_keys import of_front
 from service.cli.commands.client import submit
 from service.errors import InputError
-from service.jobs.common.problem import Pair, ProblemRequest, Ranges
-from service.jobs.common.scenes import Number, SceneRequest
+from service.jobs.common.problem_requests import Pair, ProblemRequest, Ranges
+from service.jobs.common.scene_requests import Number, SceneRequest
+from service.jobs.kind_registry import JobKind, JobRequest, KindView
 from service.jobs.kinds import SHIPPED
-from service.jobs.registry import JobKind, JobRequest, KindView
 
 
 class ShapesRequest(SceneRequest):

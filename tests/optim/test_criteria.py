@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import solver
+from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.evaluation import evaluate
-from optim.criteria.rows import DesignEvaluation
-from optim.problem.problem import pose
+from optim.problem.design_problem import pose
 
 # scene, changed values, design point; the bladed disk in three regimes and with separation.
 CASES = {

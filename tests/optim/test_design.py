@@ -10,8 +10,8 @@ import optim
 import solver
 from optim.criteria.evaluation import evaluate
 from optim.errors import DesignError
-from optim.problem.problem import pose
-from optim.results.design import DesignStatus
+from optim.problem.design_problem import pose
+from optim.results.design_result import DesignStatus
 
 
 def peak_of(scene: solver.Scene, values: dict[str, float]) -> float:

@@ -9,14 +9,14 @@ import pytest
 
 import solver
 from optim.criteria.band import BAND
+from optim.criteria.constraint_rows import DesignEvaluation, nearest
 from optim.criteria.criterion import CriterionRow
 from optim.criteria.evaluation import evaluate
 from optim.criteria.forbidden import FORBIDDEN
 from optim.criteria.friction_work import FRICTION_WORK
-from optim.criteria.peak import PEAK
-from optim.criteria.rows import DesignEvaluation, nearest
+from optim.criteria.peak_criterion import PEAK
 from optim.criteria.separation import SEPARATION
-from optim.problem.problem import Problem, pose
+from optim.problem.design_problem import Problem, pose
 
 DISK_OPTIMUM = 185.46090223680778
 

@@ -8,8 +8,8 @@ import pytest
 import optim
 import solver
 from optim.errors import DesignError
-from optim.problem.problem import Method
-from optim.results.design import DesignResult, DesignStatus
+from optim.problem.design_problem import Method
+from optim.results.design_result import DesignResult, DesignStatus
 
 SCENES = {"two-dof": ("damper.N0", 20.0, 500.0), "bladed-disk": ("shroud.N0", 20.0, 3000.0)}
 METHODS = ("tracked", "minimax", "ipopt")

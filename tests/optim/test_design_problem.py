@@ -6,13 +6,13 @@ import pytest
 import optim
 import solver
 from optim.criteria.band import BAND
+from optim.criteria.criterion_registry import criteria
 from optim.criteria.evaluation import evaluate
 from optim.criteria.forbidden import FORBIDDEN
-from optim.criteria.peak import PEAK
-from optim.criteria.registry import criteria
+from optim.criteria.peak_criterion import PEAK
 from optim.errors import DesignError
-from optim.problem.problem import pose
-from optim.results.design import DesignStatus
+from optim.problem.design_problem import pose
+from optim.results.design_result import DesignStatus
 
 TWO, DISK = {"damper.N0": (20.0, 500.0)}, {"shroud.N0": (20.0, 3000.0)}
 

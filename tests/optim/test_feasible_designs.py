@@ -8,8 +8,8 @@ from cases.limited_designs import brute_force, judged, limited_design
 
 import optim
 import solver
-from optim.results.design import Certainty, DesignStatus
-from optim.robust.result import RobustStatus
+from optim.results.design_result import Certainty, DesignStatus
+from optim.robust.robust_result import RobustStatus
 
 KEPT = 1e-5  # relative excess over a bound, of sweeps of their own
 WORSE = 1e-3  # relative, of what is minimised, than the best of the grid

@@ -13,8 +13,8 @@ from floating_cases import pulled, two_blades, underplatform
 from return_map import Return
 
 import optim
-from optim.results.design import DesignStatus
-from optim.robust.result import RobustStatus
+from optim.results.design_result import DesignStatus
+from optim.robust.robust_result import RobustStatus
 from optim.studies.crossings import CampbellStatus
 from service.cli import main
 from solver import (
@@ -27,7 +27,7 @@ from solver import (
     sweep,
     track_peak,
 )
-from solver.studies.peaks.results import TrackStatus
+from solver.studies.peaks.track_results import TrackStatus
 from solver.studies.study_results import MapStatus
 
 H = 3

@@ -27,11 +27,11 @@ from random_designs import (
 
 import optim
 import solver
-from optim.criteria.peak import PEAK
+from optim.criteria.peak_criterion import PEAK
 from optim.methods.surrogate import Taylor, corners, places, promising
-from optim.problem.problem import Method, Problem
-from optim.results.design import Certainty, DesignResult, DesignStatus
-from optim.robust.result import RobustResult, RobustStatus
+from optim.problem.design_problem import Method, Problem
+from optim.results.design_result import Certainty, DesignResult, DesignStatus
+from optim.robust.robust_result import RobustResult, RobustStatus
 from optim.robust.scenarios import outcome
 
 DATA = Path(__file__).parent.parent / "data"

@@ -16,7 +16,7 @@ from every_module import every_module
 import optim
 import solver
 import stickslip.lab
-from optim.results.design import DesignStatus
+from optim.results.design_result import DesignStatus
 from optim.views.tables.robust import robust
 from service.cli import main
 from service.rendering.text import print_told

@@ -10,8 +10,8 @@ import optim
 import solver
 from optim.criteria.evaluation import evaluate
 from optim.criteria.utilisation import UTILISATION
-from optim.problem.problem import pose
-from optim.results.design import DesignStatus
+from optim.problem.design_problem import pose
+from optim.results.design_result import DesignStatus
 from solver.scene.scene import Scene
 
 

@@ -9,7 +9,7 @@ import pytest
 import optim
 import solver
 from optim.errors import DesignError
-from optim.results.design import DesignStatus
+from optim.results.design_result import DesignStatus
 from solver.balance.balance import build
 from solver.balance.workspace import Workspace
 from solver.errors import SettingError

@@ -16,8 +16,8 @@ from optim.criteria.quality import QUALITY
 from optim.criteria.running_speeds import RUNNING
 from optim.criteria.wear_rate import WEAR_RATE
 from optim.errors import DesignError
+from optim.problem.design_problem import pose
 from optim.problem.issues import problem_issues
-from optim.problem.problem import pose
 from solver.modes.at_amplitudes import mode_at_amplitudes
 from solver.scene.scene import Scene
 from stickslip.lab.wear_life.worn_peak import WORN

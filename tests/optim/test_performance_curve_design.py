@@ -7,7 +7,7 @@ import pytest
 
 import optim
 import solver
-from optim.problem.keys import TOLERANCE
+from optim.problem.problem_keys import TOLERANCE
 
 LOADS = {"damper.N0": (20.0, 1000.0)}
 

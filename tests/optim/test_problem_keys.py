@@ -9,10 +9,10 @@ import pytest
 import optim
 import solver
 from optim.errors import DesignError
+from optim.problem.design_problem import pose
 from optim.problem.issues import problem_issues, uncertainty_issues
-from optim.problem.keys import OPTIONS, ROBUST, DesignKeys, FrontKeys, options
 from optim.problem.keyword_types import DesignKeywords, FrontKeywords
-from optim.problem.problem import pose
+from optim.problem.problem_keys import OPTIONS, ROBUST, DesignKeys, FrontKeys, options
 from optim.problem.words import Aim, AimWord, Method, MethodWord, Scaling, ScalingWord
 
 TWO = solver.load_scene("two-dof")

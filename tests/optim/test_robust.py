@@ -14,11 +14,11 @@ import optim
 import solver
 from optim.criteria.band import BAND
 from optim.criteria.criterion import CriterionRow
-from optim.criteria.peak import PEAK
-from optim.problem.problem import pose
+from optim.criteria.peak_criterion import PEAK
+from optim.problem.design_problem import pose
 from optim.problem.uncertainty_input import read_uncertain
 from optim.problem.uncertainty_set import Scenario, UncertaintyShape
-from optim.robust.result import RobustStatus
+from optim.robust.robust_result import RobustStatus
 from optim.robust.scenarios import Outcome, outcome
 from optim.robust.worst_case import Aspect, UnknownScenarioError, pessimise
 from solver.continuation.branches.observation import observing
@@ -365,7 +365,7 @@ def test_a_search_that_runs_out_says_how_far_it_came(monkeypatch: pytest.MonkeyP
         TWO, uncertain={"half_axes": {"damper.mu": 0.3, "damper.kt": 0.2}, "relative": True}, variables=N0,
         samples=2, harmonics=3,
     )  # fmt: skip
-    monkeypatch.setattr("optim.robust.search.MOST_RESPONSES", 40)
+    monkeypatch.setattr("optim.robust.robust_search.MOST_RESPONSES", 40)
     spent = optim.robust_design(TWO, uncertain=KT_AND_MU, variables=N0, harmonics=3)
     assert open_gap.status is RobustStatus.NOT_CLOSED
     assert open_gap.gap > 1e-6

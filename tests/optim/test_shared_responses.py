@@ -11,8 +11,8 @@ import solver
 from benchmarks.problems import case_a
 from optim.criteria.evaluation import evaluate
 from optim.methods import enough_harmonics as enough
-from optim.problem.problem import pose
-from solver.contacts.kernels.circle import hessian
+from optim.problem.design_problem import pose
+from solver.contacts.kernels.circle import circle_hessian as hessian
 from solver.continuation.branch import Branch
 from solver.continuation.branches.observation import observing
 

@@ -14,8 +14,8 @@ from optim.criteria.evaluation import evaluate
 from optim.criteria.stress import STRESS
 from optim.criteria.utilisation import UTILISATION
 from optim.errors import DesignError
-from optim.problem.problem import pose
-from optim.results.design import DesignStatus
+from optim.problem.design_problem import pose
+from optim.results.design_result import DesignStatus
 from solver.balance.kernels.haigh import utilisation
 from solver.scene.materials import counted, utilisation_of
 from solver.scene.scene import Scene

@@ -7,7 +7,7 @@ import pytest
 
 import optim
 import solver
-from optim.problem.problem import pose
+from optim.problem.design_problem import pose
 from optim.problem.uncertainty_input import read_uncertain
 from optim.problem.uncertainty_set import UncertainSet, UncertaintyShape
 

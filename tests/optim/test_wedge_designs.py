@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 import optim
 import solver
 from optim import DesignStatus
-from optim.problem.problem import pose
+from optim.problem.design_problem import pose
 from solver import Scene
 
 HARMONICS = 3

@@ -7,7 +7,7 @@ import pytest
 
 import optim
 import solver
-from optim.results.design import DesignStatus
+from optim.results.design_result import DesignStatus
 from solver.scene.scene import Scene
 
 HARMONICS = 3

@@ -19,7 +19,7 @@ from service_helpers import serving
 
 import optim
 from service.jobs.kinds import SHIPPED
-from service.rendering.report.design import design_report
+from service.rendering.report.design_report import design_report
 from service.rendering.report.sections import Designed
 from solver.scene.scene import load_scene
 

@@ -16,7 +16,7 @@ from page_site import Site, Watch
 from page_visits import DROP, visit
 from sector_files import SECTORS, sector_files
 
-from solver.matrices.readers.registry import readers
+from solver.matrices.readers.reader_registry import readers
 
 expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")

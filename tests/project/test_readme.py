@@ -29,11 +29,11 @@ from service.cli import main
 from service.cli.app import command
 from service.cli.options.problem_inputs import OPTIONS
 from service.cli.table import Deferred
-from service.jobs.registry import ABOUT_THE_RUN
+from service.jobs.kind_registry import ABOUT_THE_RUN
 from service.jobs.strict_json import validated
-from service.jobs.studies.design import Design
+from service.jobs.studies.design_study import Design
 from service.settings.settings import Settings
-from solver.contacts.laws.registry import laws, unregister
+from solver.contacts.laws.law_registry import laws, unregister
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

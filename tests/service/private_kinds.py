@@ -11,12 +11,12 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from service.jobs.checkpoints import Checkpoints, RunParts
-from service.jobs.figures import ContactValues, StoredArray, SweepRecord
+from service.jobs.job_parts import Division, JobPart, PartOutput, PartStoppedError
+from service.jobs.kind_registry import JobKind, JobRequest, Registry, Resolved
 from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop
-from service.jobs.parts import Division, JobPart, PartOutput, PartStoppedError
-from service.jobs.registry import JobKind, JobRequest, Registry, Resolved
-from service.jobs.studies import map as maps
-from service.jobs.studies.sweep import Sweep
+from service.jobs.stored_figures import ContactValues, StoredArray, SweepRecord
+from service.jobs.studies import map_study as maps
+from service.jobs.studies.sweep_study import Sweep
 from solver.errors import Issue, SceneError, SettingError
 
 

@@ -22,7 +22,7 @@ from service.db.models import Upload
 from service.db.repositories import NewJob, UploadRepository
 from service.http.app import create_app
 from service.http.server import _bind, _config, _Server
-from service.jobs.registry import Registry
+from service.jobs.kind_registry import Registry
 from service.queue.core import Service
 from service.settings.settings import Settings, load_settings
 

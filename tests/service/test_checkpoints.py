@@ -23,9 +23,9 @@ from service.db.engine import Database
 from service.db.models import Checkpoint, JobState
 from service.db.repositories import Attempt, JobRepository, NewJob
 from service.jobs.checkpoints import Checkpoints, KeptPieces, UnusableError, packed, unpacked
+from service.jobs.job_parts import PartStoppedError
 from service.jobs.kinds import SHIPPED
 from service.jobs.outputs import FailureKind, JobFailure, JobOutput, Pace, ResultPiece, ShouldStop, Silent
-from service.jobs.parts import PartStoppedError
 from service.queue.core import Service
 
 DISK = solver.annulus(solver.load_scene("bladed-disk")).to_dict()

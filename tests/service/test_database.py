@@ -24,8 +24,8 @@ from service.db.engine import Database, backup, is_sqlite, migrating, sqlite_not
 from service.db.models import NOBODY, Job, JobState, TableBase
 from service.db.repositories import Attempt, JobRepository, SceneRepository
 from service.errors import DatabaseError, DatabaseInUseError, WrongRevisionError
-from service.jobs.figures import StoredArray
 from service.jobs.outputs import FailureKind, JobFailure, JobOutput
+from service.jobs.stored_figures import StoredArray
 from service.queue.core import Service
 
 

@@ -23,10 +23,10 @@ from service.db.clock import new_id, utc_now
 from service.db.engine import Database, migrating
 from service.db.models import Job, JobState, TableBase
 from service.db.repositories import ResultRepository
-from service.db.repositories.results import insert_results
+from service.db.repositories.result_repository import insert_results
 from service.errors import InvalidRequestError
-from service.jobs.common.records import design_record
-from service.jobs.figures import DESIGN, DesignRecord, VariableValues
+from service.jobs.common.sweep_records import design_record
+from service.jobs.stored_figures import DESIGN, DesignRecord, VariableValues
 from service.jobs.strict_json import validated
 from service.schemas.answers import DesignDetail
 from service.schemas.result_queries import DesignQuery, design_page

@@ -19,7 +19,7 @@ from service.db.repositories import Attempt
 from service.jobs.outputs import Point, ResultPiece
 from service.settings.settings import load_settings
 from service.workers import processes
-from service.workers.base import Finished, Lost, Outcome, Stopped
+from service.workers.executor import Finished, Lost, Outcome, Stopped
 from service.workers.executors import LocalExecutor
 from service.workers.slot import MOST_AHEAD
 

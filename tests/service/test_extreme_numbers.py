@@ -11,10 +11,10 @@ import pytest
 
 from optim.errors import DataError
 from service.errors import InvalidRequestError
+from service.jobs.job_parts import PartStoppedError
+from service.jobs.kind_registry import ABOUT_THE_JOB
 from service.jobs.kinds import SHIPPED
 from service.jobs.outputs import Silent
-from service.jobs.parts import PartStoppedError
-from service.jobs.registry import ABOUT_THE_JOB
 from service.jobs.strict_json import dumps, validated
 
 SMALL = [5e-324, 1e-300, 1e-160, 1e-30, 1e-16, 1e-9]

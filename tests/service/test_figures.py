@@ -14,9 +14,10 @@ from service.client.embedded import EmbeddedService
 from service.db.clock import utc_now
 from service.db.engine import Database
 from service.db.repositories import JobRepository, NewJob, ResultRepository
-from service.db.repositories.results import insert_results
+from service.db.repositories.result_repository import insert_results
 from service.errors import InvalidRequestError
-from service.jobs.figures import (
+from service.jobs.kinds import SHIPPED
+from service.jobs.stored_figures import (
     ContactValues,
     FigureValue,
     SweepRecord,
@@ -24,7 +25,6 @@ from service.jobs.figures import (
     quantities_of_model,
     quantities_of_record,
 )
-from service.jobs.kinds import SHIPPED
 from service.schemas.answers import StoredResult
 from service.schemas.result_queries import ResultQuery, SweepQuery, result_page, sweep_page
 from service.settings.settings import load_settings

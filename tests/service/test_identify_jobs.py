@@ -11,7 +11,7 @@ from service.cli.options.inputs import join_words
 from service.errors import InvalidRequestError
 from service.jobs.outputs import Silent
 from service.jobs.strict_json import validated
-from service.jobs.studies.identify import Identify
+from service.jobs.studies.identify_study import Identify
 from service.jobs.study import resolve
 
 BODY: Mapping[str, Any] = {

@@ -8,7 +8,7 @@ import pytest
 from service_helpers import is_problem, job_ids
 
 import solver
-from service.jobs.common.records import contact_values
+from service.jobs.common.sweep_records import contact_values
 
 WAIT = {"Prefer": "wait=60"}
 

@@ -10,8 +10,8 @@ from service_helpers import PATIENCE, settings_of
 from service.auth.callers import KEYLESS, Caller, Scope, included
 from service.db.models import JobState
 from service.errors import ConflictError, IdempotencyError, InvalidRequestError, NotFoundError
-from service.jobs.common.scenes import HarmonicRequest, resolve_scene
-from service.jobs.studies.sweep import Sweep
+from service.jobs.common.scene_requests import HarmonicRequest, resolve_scene
+from service.jobs.studies.sweep_study import Sweep
 from service.queue.core import Service
 from solver.scene.scene import load_scene
 

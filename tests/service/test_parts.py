@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 import solver
+from service.jobs.job_parts import Account, Division, JobPart, PartOutput, PartStoppedError, final_one
+from service.jobs.kind_registry import JobKind
 from service.jobs.kinds import SHIPPED
 from service.jobs.outputs import JobOutput
-from service.jobs.parts import Account, Division, JobPart, PartOutput, PartStoppedError, final_one
-from service.jobs.registry import JobKind
 
 DISK: dict[str, Any] = dict(solver.load_scene("bladed-disk").to_dict())
 DISK["structure"] = {**DISK["structure"], "sectors": 3}

@@ -13,9 +13,9 @@ from service_helpers import is_problem, until
 
 import solver
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, PreviewError, QueueFullError
+from service.jobs.kind_registry import JobKind, JobRequest, Registry, Resolved, SceneSource
 from service.jobs.kinds.previews import LIVE_UNKNOWNS, POINT_UNKNOWNS, harmonics_in_time
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
-from service.jobs.registry import JobKind, JobRequest, Registry, Resolved, SceneSource
 from service.workers.preview_workers import MOST_WAITING, Previews
 from solver.errors import SettingError, SolverError
 

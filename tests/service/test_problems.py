@@ -12,14 +12,14 @@ from service_helpers import Shipped, is_problem, job_ids
 
 import optim
 import solver
-from optim.problem.problem import Method, pose
+from optim.problem.design_problem import Method, pose
 from service.cli import main
 from service.errors import InvalidRequestError
-from service.jobs.common.problem import arguments
-from service.jobs.registry import ABOUT_THE_RUN
+from service.jobs.common.problem_requests import arguments
+from service.jobs.kind_registry import ABOUT_THE_RUN
 from service.jobs.strict_json import validated
-from service.jobs.studies.design import Design
-from service.jobs.studies.pareto import Pareto
+from service.jobs.studies.design_study import Design
+from service.jobs.studies.pareto_study import Pareto
 from service.jobs.study import resolve
 from solver.errors import Issue
 from solver.scene.validation import cross_issues

@@ -13,7 +13,7 @@ from sqlalchemy import update
 from service.client.embedded import EmbeddedService
 from service.db.models import Job, JobState
 from service.errors import ConflictError, JobFailedError, QueueFullError
-from service.jobs.registry import Registry
+from service.jobs.kind_registry import Registry
 from service.queue.core import Service
 from service.queue.health import check
 

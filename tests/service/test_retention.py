@@ -21,12 +21,12 @@ from service.db.models import Job, JobResult, JobState, Result, RunTag, SweepArr
 from service.db.repositories import JobRepository, UploadRepository
 from service.db.repositories.integrity import check
 from service.db.repositories.owned import Projects
-from service.db.repositories.retention import Pruned, RetentionRepository
-from service.db.repositories.rows import RunWords
-from service.db.repositories.runs import Runs, Shares
+from service.db.repositories.retention_repository import Pruned, RetentionRepository
+from service.db.repositories.run_repository import Runs, Shares
+from service.db.repositories.stored_rows import RunWords
 from service.errors import ConflictError, DatabaseError, StorageFullError
-from service.jobs.figures import DesignRecord, StoredArray, SweepRecord
 from service.jobs.outputs import JobOutput
+from service.jobs.stored_figures import DesignRecord, StoredArray, SweepRecord
 from service.queue.retention import Retention, prune, prune_database, prune_uploads
 
 DAY = timedelta(days=1)

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from test_previews import WaitRequest, _resolve
 
+from service.jobs.kind_registry import JobKind, Registry
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
-from service.jobs.registry import JobKind, Registry
 from service.queue.health import readiness
 from service.workers import processes
 from service.workers.preview_workers import Previews

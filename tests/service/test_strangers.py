@@ -23,9 +23,9 @@ from service.auth.allowances import Buckets
 from service.auth.callers import Scope
 from service.db.clock import new_id, utc_now
 from service.db.models import Job, JobResult, JobState
-from service.db.repositories.results import insert_results
+from service.db.repositories.result_repository import insert_results
 from service.http.routes import page
-from service.jobs.figures import DesignRecord
+from service.jobs.stored_figures import DesignRecord
 from solver.scene.scene import load_scene
 
 ROLES = ("none", "wrong", "another", "revoked", "expired", "read", "submit", "admin")

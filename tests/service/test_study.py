@@ -8,13 +8,13 @@ from collections.abc import Iterator, Mapping
 
 import pytest
 
-from optim.problem.keys import options
+from optim.problem.problem_keys import options
 from service.cli.options.key_options import key_options, options_of
 from service.cli.table import STUDY, TOP
-from service.jobs.common.problem import ProblemRequest
+from service.jobs.common.problem_requests import ProblemRequest
+from service.jobs.kind_registry import JobRequest
 from service.jobs.kinds import SHIPPED, studies
 from service.jobs.kinds.bodies import KIND, body_model
-from service.jobs.registry import JobRequest
 from service.jobs.study import Study
 from solver.results.views import on_demand
 

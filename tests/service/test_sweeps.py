@@ -15,10 +15,10 @@ from service.db.clock import utc_now
 from service.db.engine import Database
 from service.db.models import NOBODY
 from service.db.repositories import JobRepository, NewJob, ResultRepository
-from service.db.repositories.results import insert_results
+from service.db.repositories.result_repository import insert_results
 from service.errors import InvalidRequestError
-from service.jobs.figures import SWEEP, ContactValues, StoredArray, SweepRecord
 from service.jobs.outputs import JobOutput
+from service.jobs.stored_figures import SWEEP, ContactValues, StoredArray, SweepRecord
 from service.jobs.strict_json import validated
 from service.schemas.answers import SweepDetail
 from service.schemas.result_queries import SweepQuery, sweep_page

@@ -19,8 +19,8 @@ from service.db.engine import Database
 from service.db.models import Job, JobResult, JobState
 from service.db.repositories import JobRepository
 from service.db.repositories.owned import Projects
-from service.db.repositories.rows import RunWords
-from service.db.repositories.runs import RunFilter, Runs, _containing
+from service.db.repositories.run_repository import RunFilter, Runs, _containing
+from service.db.repositories.stored_rows import RunWords
 from service.errors import (
     ChangedMeanwhileError,
     ConflictError,
@@ -28,7 +28,7 @@ from service.errors import (
     ServiceProblem,
     StorageFullError,
 )
-from service.jobs.figures import alone
+from service.jobs.stored_figures import alone
 from service.jobs.strict_json import JsonText
 from service.schemas.comparisons import differences
 from solver.scene.scene import load_scene
@@ -413,7 +413,7 @@ def test_runs_of_a_time_are_found_where_the_clocks_of_machines_differ(database: 
 def test_texts_are_found_as_by_looking_at_every_one(
     database: Database, counted: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("service.db.repositories.runs._FEW_TEXTS", counted)
+    monkeypatch.setattr("service.db.repositories.run_repository._FEW_TEXTS", counted)
     jobs, runs = JobRepository(database), Runs(database, utc_now, bin_days=7.0)
     chance = random.Random(5)
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from optim.errors import DataError
 from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
-from optim.identification.data.table import Table, check_monotone
-from optim.identification.data.units import Dimension
+from optim.identification.data.measured_table import Table, check_monotone
+from optim.identification.data.measured_units import Dimension
 from optim.problem.variables import Real
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects

@@ -13,8 +13,8 @@ from typing import Annotated
 
 import numpy as np
 
-from optim.identification.data.table import Table
-from optim.identification.data.units import Dimension
+from optim.identification.data.measured_table import Table
+from optim.identification.data.measured_units import Dimension
 from optim.problem.variables import Real
 from solver.extensions import Kinds
 from solver.jit.fourier import Integer
@@ -145,7 +145,7 @@ SHIPPED = (
     "optim.identification.data.mode",
     "optim.identification.data.decay",
     "optim.identification.data.resonance",
-    "optim.identification.data.peak",
+    "optim.identification.data.measured_peak",
 )
 
 

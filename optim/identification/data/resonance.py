@@ -18,11 +18,11 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
-from optim.identification.data.curve import CurveRun, check_level, columns_of
 from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
+from optim.identification.data.measured_curve import CurveRun, check_level, columns_of
+from optim.identification.data.measured_table import Table
+from optim.identification.data.measured_units import Dimension
 from optim.identification.data.response import NOT_REACHED, measured_dof, observing_dof
-from optim.identification.data.table import Table
-from optim.identification.data.units import Dimension
 from optim.problem.variables import Real
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects, even_harmonics_reason

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from optim.errors import DataError
 from optim.identification.data.measured import known_columns
-from optim.identification.data.units import Dimension, Scaling, known_units, no_motion, unit_of
-from optim.identification.readers.layout import Layout, heading_unit
-from optim.identification.readers.numbers import is_number
+from optim.identification.data.measured_units import Dimension, Scaling, known_units, no_motion, unit_of
+from optim.identification.readers.number_texts import is_number
+from optim.identification.readers.text_layout import Layout, heading_unit
 
 LEFT_OUT = ""
 FORCE = "excitation.amplitude"

@@ -17,10 +17,10 @@ from typing import Annotated
 import numpy as np
 
 from optim.errors import DataError
-from optim.identification.data.table import Table
-from optim.identification.data.units import Dimension, Unit, unit_of, wanted_unit
+from optim.identification.data.measured_table import Table
+from optim.identification.data.measured_units import Dimension, Unit, unit_of, wanted_unit
+from optim.identification.readers.data_readers import DataFormat, complex_apart, read_head, table_of
 from optim.identification.readers.encodings import decoded
-from optim.identification.readers.registry import DataFormat, complex_apart, read_head, table_of
 from optim.problem.variables import Real
 from solver.jit.fourier import Complex
 

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from optim.criteria.forbidden import FORBIDDEN
-from optim.criteria.peak import PEAK
+from optim.criteria.peak_criterion import PEAK
 from solver.jit.fourier import Real
 from solver.results import units
 from solver.results.measures import Measured
@@ -24,7 +24,7 @@ from solver.views.plots.responses import Demands, response_figure
 from solver.views.plots.style import Into
 
 if TYPE_CHECKING:
-    from optim.results.design import DesignResult
+    from optim.results.design_result import DesignResult
 
 
 def design_figure(result: DesignResult, *, ax: Into = None) -> Figure:

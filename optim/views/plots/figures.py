@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from optim.results.design import DesignResult
+from optim.results.design_result import DesignResult
 from optim.studies.crossings import CampbellDiagram
 from optim.views.plots.campbell import campbell_figure
 from optim.views.plots.designs import design_figure

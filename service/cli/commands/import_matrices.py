@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from service.cli.importing.files import (
+from service.cli.importing.import_files import (
     Sources,
     dof_table,
     existing_file,
@@ -18,10 +18,10 @@ from service.cli.importing.files import (
     rows_of,
     sources,
 )
+from service.cli.importing.import_reduction import ImportOptions, ReducedModel, reduce, reduced_file
+from service.cli.importing.import_scene import band, excitation, toml
+from service.cli.importing.import_scene import contacts as contact_tables
 from service.cli.importing.patches import Patches
-from service.cli.importing.reduction import ImportOptions, ReducedModel, reduce, reduced_file
-from service.cli.importing.scene import band, excitation, toml
-from service.cli.importing.scene import contacts as contact_tables
 from service.cli.importing.sector import (
     DiskOptions,
     WrittenSector,
@@ -201,7 +201,7 @@ def _gone(given: MatrixSet | None, of: DiskOptions) -> Any:
 
 def _damped(found: Sources) -> bool:
     """Whether the files hold damping."""
-    from solver.matrices.files import read_modes
+    from solver.matrices.matrix_files import read_modes
 
     return "C" in found.roles or (
         "modes" in found.roles and read_modes(found.roles["modes"]).damping_ratio is not None
@@ -269,7 +269,7 @@ def _report(
     given: MatrixSet | None, notes: list[str], as_json: bool,
 ) -> None:  # fmt: skip
     from solver.matrices.diagnostics import total_mass
-    from solver.scene.parts import MatricesStructure
+    from solver.scene.scene_records import MatricesStructure
 
     structure = scene.structure
     mass = None if given is None else total_mass(given)

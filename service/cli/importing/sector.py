@@ -16,9 +16,9 @@ from solver.results.files import whole
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from service.cli.importing.reduction import ImportOptions
+    from service.cli.importing.import_reduction import ImportOptions
     from solver.matrices.load_set import MatrixSet
-    from solver.matrices.sectors.reduction import ReducedSector
+    from solver.matrices.sectors.sector_reduction import ReducedSector
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -173,7 +173,7 @@ def reduce_disk(
     from solver.errors import SceneError
     from solver.matrices.diagnostics import refuse
     from solver.matrices.sectors.loading import check_part_sizes, parts_to_reduce
-    from solver.matrices.sectors.reduction import diameters_met, reduce_sector, write_diameters
+    from solver.matrices.sectors.sector_reduction import diameters_met, reduce_sector, write_diameters
 
     if modes is None or modes < 0:
         raise InputError("`--reduce` of a sector takes --modes N: as many at each nodal diameter")

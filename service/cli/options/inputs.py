@@ -99,7 +99,7 @@ def _several(arguments: Sequence[str]) -> dict[str, int]:
         return {"--unknown": 3, "--prior": 3}
     if not arguments or arguments[0] not in ("design", "pareto", "submit"):
         return {}
-    from optim.problem.keys import DesignKeys, FrontKeys, options
+    from optim.problem.problem_keys import DesignKeys, FrontKeys, options
 
     model: type[BaseModel] = DesignKeys if arguments[0] == "design" else FrontKeys
     if arguments[0] == "submit":

@@ -19,7 +19,7 @@ from service.cli.options import shared as options
 from service.cli.options.inputs import number, whole_number
 from service.cli.options.parameters import Command, keyword, parameters_of
 from service.errors import InputError
-from service.jobs.registry import Flag, JobKind
+from service.jobs.kind_registry import Flag, JobKind
 from solver.scene.descriptions import DISK_LOAD
 
 SCENE = "scene"

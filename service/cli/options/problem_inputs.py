@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from optim.criteria.key import Form, Option
-from optim.problem.keys import DesignKeys, FrontKeys, options
+from optim.problem.problem_keys import DesignKeys, FrontKeys, options
 from service.cli import completion
 from service.cli.completion import SCENE_FILES
 from service.cli.failures import refused
@@ -22,14 +22,14 @@ from service.cli.options import inputs, shared
 from service.cli.options.inputs import number, whole_number
 from service.cli.options.parameters import Command, keyword, parameters_of, with_parameters
 from service.errors import InputError
-from service.jobs.common.scenes import UPLOAD, Place, named_files, with_named
+from service.jobs.common.scene_requests import UPLOAD, Place, named_files, with_named
 from solver.errors import Issue, SceneError, SettingError
 from solver.jit.beside import cost, prepare
 from solver.scene.toml import TomlError, read_toml
 
 if TYPE_CHECKING:
     from service.client.client import Client
-    from service.jobs.common.problem import ProblemRequest
+    from service.jobs.common.problem_requests import ProblemRequest
     from solver.scene.scene import Scene
 
 
@@ -171,7 +171,7 @@ def posed(told: Description, study: type[ProblemRequest]) -> tuple[Scene, dict[s
     InputError, SceneError
         What is wrong, by the option or the key that has to change.
     """
-    from service.jobs.common.problem import arguments
+    from service.jobs.common.problem_requests import arguments
 
     request = checked(told, study)
     scene = _with_values(told, _scene(told), request)
@@ -364,7 +364,7 @@ def uploaded(client: Client, body: Mapping[str, Any]) -> dict[str, Any]:
 
 def _labels_beside(structure: Mapping[str, Any], folder: Path) -> Path | None:
     """The file that names the rows, where DOFs are named by node and only its place says so."""
-    from solver.matrices.files import labels_beside
+    from solver.matrices.matrix_files import labels_beside
 
     dofs = structure.get("dofs")
     by_node = isinstance(dofs, Mapping) and any(isinstance(row, str) for row in dofs.values())

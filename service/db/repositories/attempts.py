@@ -23,7 +23,7 @@ from sqlalchemy import (
 
 from service.db.engine import Database
 from service.db.models import Checkpoint, Job, JobState
-from service.db.repositories.rows import Attempt, RecoveredJobs
+from service.db.repositories.stored_rows import Attempt, RecoveredJobs
 from service.jobs.outputs import FailureKind, JobFailure, ResultPiece
 
 # Built once: it goes with the end of every job.

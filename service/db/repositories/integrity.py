@@ -13,11 +13,11 @@ from sqlalchemy.exc import DBAPIError
 from service.db.arrays_outside import ArrayStore, array_store
 from service.db.engine import database_name, database_path, is_sqlite, read_engine
 from service.db.models import Job, JobResult, JobState, Project, Result, Run, SweepArray, Upload
-from service.db.repositories.results import whole
+from service.db.repositories.result_repository import whole
 from service.db.revisions import head_revision, off_head
 from service.db.upload_files import UploadFiles
 from service.errors import DamagedDatabaseError, DatabaseError, WrongRevisionError
-from service.jobs.figures import SWEEP
+from service.jobs.stored_figures import SWEEP
 
 # A job that ends as `successful` wrote its result with the same transaction, unless it repeats another's.
 # One that failed may have kept what it computed short of its goal.

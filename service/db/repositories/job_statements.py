@@ -10,8 +10,8 @@ from sqlalchemy.sql.elements import ColumnElement
 
 from service.db.models import Job, JobResult, JobState
 from service.db.repositories.attempts import OWNED
-from service.db.repositories.rows import Attempt, JobRow, NewJob
-from service.db.repositories.runs import in_the_bin
+from service.db.repositories.run_repository import in_the_bin
+from service.db.repositories.stored_rows import Attempt, JobRow, NewJob
 
 _JOB: Table = Job.metadata.tables["job"]
 _RESULT: Table = JobResult.metadata.tables["job_result"]

@@ -11,7 +11,7 @@ from fastapi import APIRouter, Query, Response
 from fastapi.sse import _SSE_EVENT_SCHEMA, EventSourceResponse, format_sse_event
 
 from service.db.models import NOBODY, JobState
-from service.db.repositories.runs import RunFilter
+from service.db.repositories.run_repository import RunFilter
 from service.http.dependencies import InContext, Responses, TypedRoute
 from service.http.in_lane import reading
 from service.http.middleware.every_answer import HEADERS_ONLY

@@ -18,7 +18,7 @@ from service.http.dependencies import (
     tagged,
 )
 from service.http.in_lane import drawing, reading, writing_files
-from service.jobs.figures import SweepRecord
+from service.jobs.stored_figures import SweepRecord
 from service.rendering.representations import (
     BY_FORMAT,
     JSON,

@@ -62,7 +62,7 @@ def look_at(scene: Scene, files: Sequence[Mapping[str, str]]) -> dict[str, Any]:
     from optim.errors import DataError
     from optim.identification.data.measured import known_columns
     from optim.identification.readers.headings import FORCE, guesses, units_for
-    from optim.identification.readers.layout import layout_of
+    from optim.identification.readers.text_layout import layout_of
 
     paths = frozenset(scene.parameter_paths())
     found, issues = [], []
@@ -96,7 +96,7 @@ def look_at(scene: Scene, files: Sequence[Mapping[str, str]]) -> dict[str, Any]:
 def _is_known(layout: Any, paths: frozenset[str]) -> bool:
     """Whether the headings are those that files have here, so that nothing is to be chosen."""
     from optim.identification.data.measured import known_columns
-    from optim.identification.data.table import split_head
+    from optim.identification.data.measured_table import split_head
 
     known = known_columns()
     names = [split_head(heading)[0] for heading in layout.heads]

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
-from solver.contacts.laws.parts import ContactMotion
+from solver.contacts.laws.contact_parts import ContactMotion
 from solver.scene.scene import AnyContact
 
 if TYPE_CHECKING:
-    from solver.marching.result import MarchResult
+    from solver.marching.march_result import MarchResult
     from solver.response.contact_response import ContactResponse
     from solver.response.solution import Solution
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
-from service.jobs.common.results import Table
+from service.jobs.common.result_models import Table
 from service.jobs.study import Answer, Watch
 from solver.lab import from_lab
 

@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 from optim.problem.default_variable import default_variable
 from service.jobs.common.proposals import StudyProposal, around, design_bounds, proposals
 from service.jobs.common.scene_parts import JointAnswer, joints
-from solver.contacts.laws.parts import Span
+from solver.contacts.laws.contact_parts import Span
 from solver.scene.bodies.paths import SPEED
 from solver.scene.parameter_paths import parameter_of
 from solver.scene.scene import Scene

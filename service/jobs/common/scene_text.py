@@ -9,8 +9,8 @@ from typing import Any
 
 from service.errors import InvalidRequestError, MalformedBodyError
 from service.jobs import strict_json
-from service.jobs.common.scenes import read_scene
-from service.jobs.registry import SceneSource
+from service.jobs.common.scene_requests import read_scene
+from service.jobs.kind_registry import SceneSource
 from service.jobs.strict_json import MOST_DEPTH
 from solver.errors import Issue
 from solver.scene.editing import TextPlace, edited, place_at, places

@@ -124,7 +124,7 @@ def contact_motions(scene: Scene) -> int:
 
 def coefficients(scene: Scene, harmonics: int) -> int:
     """Coefficients of a motion, those that forces of higher harmonics call for included."""
-    from solver.scene.harmonics import kept_harmonics
+    from solver.scene.scene_harmonics import kept_harmonics
 
     return 2 * len(kept_harmonics(scene, (), harmonics, odd=False)) - 1
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field
 
 from optim.criteria.key import Share
-from service.jobs.common.scenes import HarmonicRequest, Number, ParameterPath, check
+from service.jobs.common.scene_requests import HarmonicRequest, Number, ParameterPath, check
 from service.jobs.common.sizes import balance_issues
-from service.jobs.registry import Flag
+from service.jobs.kind_registry import Flag
 from solver.errors import Issue, Naming, Shown
 from solver.scene.descriptions import DISK_LOAD
 

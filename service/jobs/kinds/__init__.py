@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import optim
 import solver
+from service.jobs.kind_registry import Registry
 from service.jobs.names import there
-from service.jobs.registry import Registry
 from service.jobs.study import Study, study_named
 from solver.jit.beside import ready
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field, create_model
 
-from service.jobs.registry import JobKind, JobRequest, Registry
+from service.jobs.kind_registry import JobKind, JobRequest, Registry
 
 KIND = "kind"
 DESIGN = "design"

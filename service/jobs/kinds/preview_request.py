@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from service.jobs.common.scenes import HarmonicRequest, require, resolve_scene
+from service.jobs.common.scene_requests import HarmonicRequest, require, resolve_scene
 from service.jobs.common.sizes import balance_issues, coefficients, contact_motions, dofs_solved
-from service.jobs.registry import SceneSource
+from service.jobs.kind_registry import SceneSource
 from solver.errors import Issue
 from solver.scene.scene import Scene
 

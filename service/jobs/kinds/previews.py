@@ -13,8 +13,8 @@ from pydantic import ConfigDict, Field
 import solver
 from optim.studies.sensitivity_result import ParameterSensitivity, SensitivityResult
 from service.jobs.common.periods import Period, period_of
-from service.jobs.common.results import KindResult, PeakAt, result_model
-from service.jobs.common.scenes import (
+from service.jobs.common.result_models import KindResult, PeakAt, result_model
+from service.jobs.common.scene_requests import (
     FrequencyHz,
     PositiveNumber,
     linear_limit,
@@ -23,6 +23,7 @@ from service.jobs.common.scenes import (
     stored_scene,
 )
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP
+from service.jobs.kind_registry import JobKind, Registry, Resolved, SceneSource
 from service.jobs.kinds.preview_request import (
     POINT_UNKNOWNS,
     PreviewRequest,
@@ -36,10 +37,9 @@ from service.jobs.kinds.shape_preview import (
     run_shape,
 )
 from service.jobs.outputs import JobOutput, Progress, ShouldStop, Silent
-from service.jobs.registry import JobKind, Registry, Resolved, SceneSource
-from service.jobs.studies.solve import solve_result
+from service.jobs.studies.solve_study import solve_result
 from solver.continuation.branch import AnyBranch
-from solver.continuation.certificate import PeakCertificate
+from solver.continuation.peak_certificate import PeakCertificate
 from solver.errors import Issue
 from solver.jit.beside import interpret
 from solver.scene.descriptions import DAMPER_LOAD

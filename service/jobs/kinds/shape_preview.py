@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.jobs.common.periods import period_of
-from service.jobs.common.results import KindResult
-from service.jobs.common.scenes import FrequencyHz, Number, check, require, resolved, stored_scene
+from service.jobs.common.result_models import KindResult
+from service.jobs.common.scene_requests import FrequencyHz, Number, check, require, resolved, stored_scene
+from service.jobs.kind_registry import Resolved, SceneSource
 from service.jobs.kinds.preview_request import (
     POINT_UNKNOWNS,
     PreviewRequest,
@@ -18,8 +19,7 @@ from service.jobs.kinds.preview_request import (
     scene_of,
 )
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
-from service.jobs.registry import Resolved, SceneSource
-from service.jobs.studies.modes import Diameter
+from service.jobs.studies.modes_study import Diameter
 from solver.errors import Issue, Naming
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated, Any
 
 import solver
-from service.jobs.registry import ABOUT_THE_JOB
+from service.jobs.kind_registry import ABOUT_THE_JOB
 from service.rendering.report.about import about_section
-from service.rendering.report.responses import ReportLine, comparison_figure
+from service.rendering.report.responses_report import ReportLine, comparison_figure
 from solver.continuation.branch import AnyBranch
 from solver.results import units
 from solver.results.notes import flag_words

@@ -41,19 +41,19 @@ CLOSED, TOUCHING, DEFORMING = 5, 6, 7
 # The kernels whose numbers are the same in every process, in their order; those of others are given when they
 # are first asked for.
 KERNELS = (
-    "solver.contacts.kernels.coulomb.law:coulomb_line",
+    "solver.contacts.kernels.coulomb.line_law:coulomb_line",
     "solver.contacts.kernels.springs:gap_spring",
     "solver.contacts.kernels.springs:polynomial_spring",
-    "solver.contacts.kernels.coulomb.law:coulomb_sampled",
-    "solver.contacts.kernels.circle.law:coulomb_circle",
-    "solver.contacts.kernels.coulomb.law:coulomb_box",
-    "solver.contacts.kernels.history.law:history_law",
+    "solver.contacts.kernels.coulomb.line_law:coulomb_sampled",
+    "solver.contacts.kernels.circle.circle_law:coulomb_circle",
+    "solver.contacts.kernels.coulomb.line_law:coulomb_box",
+    "solver.contacts.kernels.history.history_law:history_law",
 )
 # Likewise those of second derivatives.
 SECOND_KERNELS = (
     "solver.contacts.kernels.coulomb.second_law:line_second",
     "solver.contacts.kernels.coulomb.second_law:box_second",
-    "solver.contacts.kernels.circle.hessian:circle_law_second",
+    "solver.contacts.kernels.circle.circle_hessian:circle_law_second",
     "solver.contacts.kernels.springs:gap_second",
     "solver.contacts.kernels.springs:polynomial_second",
 )

@@ -29,9 +29,9 @@ from __future__ import annotations
 from solver.contacts.kernels.columns import KERNELS, SECOND_KERNELS
 from solver.contacts.kernels.stick_slip_events import SEGMENT
 from solver.jit.decorators import compiled
-from solver.jit.forms import FLOAT, INTEGER
 from solver.jit.fourier import Integer, Real
-from solver.jit.records import Records
+from solver.jit.kernel_forms import FLOAT, INTEGER
+from solver.jit.kernel_records import Records
 from solver.jit.separate import numbered
 
 _VECTOR, _TABLE, _BLOCKS = (FLOAT, 1), (FLOAT, 2), (FLOAT, 3)

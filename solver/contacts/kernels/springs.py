@@ -18,13 +18,13 @@ import math
 import numpy as np
 
 from solver.contacts.kernels.columns import A_1, CLOSED, DEFORMING, GAP, K_GAP, MOST_DEGREE, TOUCHING
-from solver.contacts.kernels.coulomb.force import add_moments, bases_at, basis_at, moment_rows, products
+from solver.contacts.kernels.coulomb.line_force import add_moments, bases_at, basis_at, moment_rows, products
 from solver.contacts.kernels.coulomb.second_law import weight_at
 from solver.contacts.kernels.state_durations import contact_intervals, one_wave
 from solver.contacts.kernels.stick_slip_events import SEPARATED, largest
 from solver.jit.fourier import Integer, Real, coefficient_count
+from solver.jit.kernel_records import Records
 from solver.jit.lapack import dot, fill, fill_block
-from solver.jit.records import Records
 from solver.jit.separate import apart
 from solver.jit.trig_polynomial import on_grid, unpack
 

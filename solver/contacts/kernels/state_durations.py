@@ -27,7 +27,7 @@ from solver.contacts.kernels.stick_slip_events import (
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real
-from solver.jit.records import Records
+from solver.jit.kernel_records import Records
 from solver.jit.separate import apart
 from solver.jit.trig_polynomial import FALLING, RISING, at_point, bracketed_root, on_grid, unpack
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
-from solver.jit.records import Records, record
+from solver.jit.kernel_records import Records, record
 from solver.jit.separate import apart
 from solver.jit.trig_polynomial import FALLING, RISING, at_point, bracketed_root, cubic_root, cubic_turn
 

@@ -28,7 +28,7 @@ import numpy as np
 from solver.contacts.kernels.stick_slip_events import new_segments
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Index, Integer, Real, coefficient_count
-from solver.jit.records import Records
+from solver.jit.kernel_records import Records
 from solver.jit.reference import referenced
 
 # What λ is, where it is no column of the contact table.

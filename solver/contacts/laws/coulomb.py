@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from solver.contacts.fields import NonNegative, Real, Stiffness
+from solver.contacts.laws.contact_parts import ContactMotion
 from solver.contacts.laws.friction import FrictionContact
-from solver.contacts.laws.parts import ContactMotion
 from solver.errors import SettingError
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Contact(SlidesOnALine):
     FORCE: ClassVar[str] = (
         "stick `kt u + c`, slip `± μN`, nothing while `N <= 0`; `N = N0 + N1 cos(ωt + N1_phase)`"
     )
-    KERNEL: ClassVar[str] = "solver.contacts.kernels.coulomb.law:coulomb_line"
+    KERNEL: ClassVar[str] = "solver.contacts.kernels.coulomb.line_law:coulomb_line"
     SECOND: ClassVar[str | None] = "solver.contacts.kernels.coulomb.second_law:line_second"
     JENKINS: ClassVar[bool] = True
 
@@ -51,7 +51,7 @@ class Contact(SlidesOnALine):
     @property
     def sampled_kernel(self) -> str:
         """The kernel that samples motion and load instead."""
-        return "solver.contacts.kernels.coulomb.law:coulomb_sampled"
+        return "solver.contacts.kernels.coulomb.line_law:coulomb_sampled"
 
     @property
     def evaluation(self) -> str:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from solver.contacts.fields import Between, NonNegative, Real, Samples
 from solver.contacts.kernels import columns
+from solver.contacts.laws.contact_parts import Follows, RestStiffness, Row, Slider
 from solver.contacts.laws.friction import FrictionContact
-from solver.contacts.laws.parts import Follows, RestStiffness, Row, Slider
 
 if TYPE_CHECKING:
     from solver.contacts.pieces.piece import ContactPart
@@ -33,15 +33,15 @@ class SlidesInAPlane(FrictionContact):
     def kernel(self) -> str:
         """The kernel of its limit."""
         if self.limits_apart:
-            return "solver.contacts.kernels.coulomb.law:coulomb_box"
-        return "solver.contacts.kernels.circle.law:coulomb_circle"
+            return "solver.contacts.kernels.coulomb.line_law:coulomb_box"
+        return "solver.contacts.kernels.circle.circle_law:coulomb_circle"
 
     @property
     def second_kernel(self) -> str:
         """The kernel of the second derivatives of its limit."""
         if self.limits_apart:
             return "solver.contacts.kernels.coulomb.second_law:box_second"
-        return "solver.contacts.kernels.circle.hessian:circle_law_second"
+        return "solver.contacts.kernels.circle.circle_hessian:circle_law_second"
 
     @property
     def force_alone(self) -> bool:
@@ -93,7 +93,7 @@ class SlidesInAPlane(FrictionContact):
         """Return how it follows small perturbations of a motion."""
         if self.limits_apart:
             return super().perturbed(motions, load)
-        from solver.contacts.pieces.circle import circle_pieces
+        from solver.contacts.pieces.circle_piece import circle_pieces
         from solver.contacts.pieces.piece import ContactPart
         from solver.contacts.space_path import path_in_space
 

@@ -9,9 +9,9 @@ from pydantic import model_validator
 
 from solver.contacts.fields import Between, Positive, Real, Signed
 from solver.contacts.kernels import columns
+from solver.contacts.laws.contact_parts import LawQuantity, RestStiffness
 from solver.contacts.laws.coulomb_2d import SlidesInAPlane
 from solver.contacts.laws.friction import FrictionContact
-from solver.contacts.laws.parts import LawQuantity, RestStiffness
 
 _CLOSED = (columns.N0, 1)
 

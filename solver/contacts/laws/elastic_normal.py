@@ -7,9 +7,9 @@ from typing import Annotated, ClassVar, Literal
 
 from solver.contacts.fields import Between, Signed, Stiffness
 from solver.contacts.kernels import columns
+from solver.contacts.laws.contact_parts import LawQuantity, RestStiffness
 from solver.contacts.laws.coulomb import SlidesOnALine
 from solver.contacts.laws.friction import FrictionContact
-from solver.contacts.laws.parts import LawQuantity, RestStiffness
 
 _CLOSED = (columns.N0, 1)
 
@@ -24,7 +24,7 @@ class ElasticNormalContact(SlidesOnALine):
     FORCE: ClassVar[str] = (
         "the same with `N = N0 + N1 cos(ωt + N1_phase) + kn v`, and `max(N, 0)` on the normal pair"
     )
-    KERNEL: ClassVar[str] = "solver.contacts.kernels.coulomb.law:coulomb_line"
+    KERNEL: ClassVar[str] = "solver.contacts.kernels.coulomb.line_law:coulomb_line"
     SECOND: ClassVar[str | None] = "solver.contacts.kernels.coulomb.second_law:line_second"
     PARAMETERS: ClassVar[Mapping[str, LawQuantity]] = {
         **FrictionContact.PARAMETERS,

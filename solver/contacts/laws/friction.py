@@ -11,9 +11,8 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from solver.contacts.fields import Angle, Friction, Positive, Real, Signed
 from solver.contacts.kernels import columns
-from solver.contacts.laws.base import AnyContact
-from solver.contacts.laws.harmonics import LoadHarmonic, as_harmonics, higher_quantity, named_apart, order_of
-from solver.contacts.laws.parts import (
+from solver.contacts.laws.contact_law import AnyContact
+from solver.contacts.laws.contact_parts import (
     Follows,
     LawQuantity,
     NormalLoad,
@@ -21,6 +20,13 @@ from solver.contacts.laws.parts import (
     Row,
     Slider,
     Span,
+)
+from solver.contacts.laws.load_harmonics import (
+    LoadHarmonic,
+    as_harmonics,
+    higher_quantity,
+    named_apart,
+    order_of,
 )
 from solver.errors import SettingError
 

@@ -10,8 +10,8 @@ import numpy as np
 from solver.contacts.fields import NonNegative, Real, Signed
 from solver.contacts.frames import NORMAL
 from solver.contacts.kernels import columns
-from solver.contacts.laws.base import AnyContact
-from solver.contacts.laws.parts import ContactMotion, Follows, LawQuantity, RestStiffness, Row
+from solver.contacts.laws.contact_law import AnyContact
+from solver.contacts.laws.contact_parts import ContactMotion, Follows, LawQuantity, RestStiffness, Row
 
 if TYPE_CHECKING:
     from solver.contacts.pieces.piece import ContactPart

@@ -11,8 +11,8 @@ from pydantic import model_validator
 from solver.contacts.fields import Real, Signed
 from solver.contacts.frames import NORMAL
 from solver.contacts.kernels import columns
-from solver.contacts.laws.base import AnyContact
-from solver.contacts.laws.parts import Follows, LawQuantity, RestStiffness, Row
+from solver.contacts.laws.contact_law import AnyContact
+from solver.contacts.laws.contact_parts import Follows, LawQuantity, RestStiffness, Row
 
 if TYPE_CHECKING:
     from solver.contacts.pieces.piece import ContactPart

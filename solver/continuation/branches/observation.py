@@ -20,9 +20,9 @@ from solver.continuation.branches.sweep import surveyed, with_error, with_points
 from solver.continuation.extrema.extrema import Survey
 from solver.continuation.extrema.node_table import PointRow
 from solver.continuation.extrema.nodes import NodeSolver, numbers_of
-from solver.continuation.peaks import Peak
-from solver.jit.clock import clock
+from solver.continuation.peak import Peak
 from solver.jit.fourier import Real
+from solver.jit.timer import clock
 from solver.linear.kernels.receptance import observer_receptance, receptance
 from solver.scene.materials import Haigh
 

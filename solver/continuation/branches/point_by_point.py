@@ -26,8 +26,8 @@ from solver.continuation.extrema.nodes import NodeSolver
 from solver.continuation.segment import Stretch
 from solver.continuation.stretches import ending
 from solver.continuation.walk import walk
-from solver.jit.clock import clock
 from solver.jit.fourier import Real
+from solver.jit.timer import clock
 from solver.linear.assembly import linear_model
 
 LARGEST, FIRST, SMALLEST = 0.0143, 1e-3, 1e-9  # steps, as shares of the range

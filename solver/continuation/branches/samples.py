@@ -21,12 +21,12 @@ from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.point_by_point import is_unique
 from solver.continuation.branches.sweep import walk, without_peaks
 from solver.continuation.branches.symmetry_breaking import branch_flags
+from solver.continuation.continuation_settings import ContinuationSettings
 from solver.continuation.extrema.node_table import PointRow
 from solver.continuation.extrema.nodes import NodeSolver
 from solver.continuation.parameter_scale import check_range
 from solver.continuation.segment import joined
-from solver.continuation.settings import ContinuationSettings
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene
 

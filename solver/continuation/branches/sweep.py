@@ -23,22 +23,22 @@ from solver.continuation.branch import ROWS, Branch, BranchStatus, Points
 from solver.continuation.branches.adaptive_harmonics import sweep_to
 from solver.continuation.branches.point_by_point import is_unique, rows_before_a_turn, walk_by_points
 from solver.continuation.branches.symmetry_breaking import branch_flags
-from solver.continuation.certificate import uncertain
+from solver.continuation.continuation_settings import ContinuationSettings
 from solver.continuation.endings import AHEAD, ends_undamped, too_stiff
 from solver.continuation.extrema.branch_error import branch_error
 from solver.continuation.extrema.extrema import Survey, band_limit
 from solver.continuation.from_nothing import solve_from_nothing
-from solver.continuation.kernels import state as walk_states
+from solver.continuation.kernels import walk_state as walk_states
 from solver.continuation.kernels.pseudo_arclength import begin_walk
 from solver.continuation.parameter_scale import check_range
-from solver.continuation.peaks import Peak
+from solver.continuation.peak import Peak
+from solver.continuation.peak_certificate import uncertain
 from solver.continuation.segment import Course, Stretch, go_on_from, joined, rows_of
-from solver.continuation.settings import ContinuationSettings
 from solver.continuation.stretches import BranchStretches, control_of, ending
 from solver.continuation.walk import walk as along
 from solver.errors import SettingError
-from solver.jit.clock import clock
 from solver.jit.fourier import Real, to_full
+from solver.jit.timer import clock
 from solver.results.notes import ABOVE_FRICTION
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.bodies.paths import SPEED

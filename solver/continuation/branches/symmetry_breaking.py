@@ -21,7 +21,7 @@ from solver.balance.simplifications import breaks_symmetry, even_harmonics_reaso
 from solver.balance.workspace import PointSolution, Workspace
 from solver.jit.fourier import Integer, Real
 from solver.scene.cyclic.annulus import sectors_needed
-from solver.scene.harmonics import places
+from solver.scene.scene_harmonics import places
 
 SYMMETRIC_UNSTABLE = "symmetric_unstable"
 NOT_UNIQUE = "not_unique"

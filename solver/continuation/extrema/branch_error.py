@@ -30,10 +30,10 @@ from solver.continuation.branch import Points
 from solver.continuation.extrema.driven import Way, may_exceed
 from solver.continuation.extrema.error_estimate import SAFETY, ErrorEstimator
 from solver.continuation.extrema.kernels.suspects import find_reaching
-from solver.continuation.peaks import Peak
+from solver.continuation.peak import Peak
 from solver.jit.fourier import Complex, Flags, Real
 from solver.linear.kernels.receptance import receptance
-from solver.scene.harmonics import among, spread
+from solver.scene.scene_harmonics import among, spread
 
 # Follows a balance between two λ from a first guess; returns the highest peak there, None without a solution.
 Follow = Callable[[Balance, float, float, Real], Peak | None]

@@ -28,7 +28,7 @@ from solver.continuation.branch import Branch
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
 from solver.results.told import Piece
-from solver.scene.harmonics import MULTIPLES, among, is_fast
+from solver.scene.scene_harmonics import MULTIPLES, among, is_fast
 
 # Harmonics looked at beyond those kept, for a solution with H of them: H + max(H, 8).
 _LEAST_BEYOND = 8

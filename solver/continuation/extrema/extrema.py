@@ -7,7 +7,7 @@ contact state. First the branch is made dense: narrow resonances that stand betw
 solutions between them. A maximum then shows between two points as a change of sign of its slope along the
 arc, a band edge as a change of sign of amplitude − limit; both are refined by solving on the arc between the
 points, so that folds need no special care. What could not be settled is said in the certificate
-(`solver.continuation.certificate`).
+(`solver.continuation.peak_certificate`).
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from solver.balance.parameter import Kind
 from solver.balance.workspace import Workspace
 from solver.continuation.between import dense_between
 from solver.continuation.branch import Points
-from solver.continuation.certificate import PeakCertificate, certified, uncertain
 from solver.continuation.extrema.intervals import CURVES, highest_share, lowest_share, may_cross
-from solver.continuation.extrema.kernels.intervals import IS_BENT, WAVES, WORTH_POLISHING
+from solver.continuation.extrema.kernels.interval_kernels import IS_BENT, WAVES, WORTH_POLISHING
 from solver.continuation.extrema.node_table import PointRow
 from solver.continuation.extrema.nodes import NodeSolver, numbers_of
 from solver.continuation.extrema.resonance_search import ResonanceSearch, Search
 from solver.continuation.extrema.state_changes import ChangeSearch
 from solver.continuation.folds import fold_between
-from solver.continuation.peaks import Band, Edge, Peak
+from solver.continuation.peak import Band, Edge, Peak
+from solver.continuation.peak_certificate import PeakCertificate, certified, uncertain
 from solver.jit.fourier import Real
 
 SHARP_RESIDUAL = 2e-11  # of a peak; what is above was accepted because arcs allowed no better

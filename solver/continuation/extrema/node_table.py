@@ -41,7 +41,7 @@ class NodeTable:
     Attributes
     ----------
     solutions, tangents, measures, observed, states : one row each.
-    partners, scales : (rows,) and (rows, 2) see `solver.continuation.extrema.kernels.intervals.look_between`.
+    partners, scales : (rows,) and (rows, 2) see `look_between`.
     """
 
     def __init__(self, unknowns: int, coefficients: int, measures: int, contacts: int) -> None:

@@ -30,9 +30,9 @@ from solver.contacts.kernels.system import evaluation_by_value
 from solver.continuation.between import closing_in
 from solver.continuation.branch import ROWS, Points
 from solver.continuation.extrema.contact_springs import LocalModel
-from solver.continuation.extrema.kernels import intervals
-from solver.continuation.extrema.kernels.intervals import look_between, middles_between
-from solver.continuation.extrema.kernels.state_changes import locate_change
+from solver.continuation.extrema.kernels import interval_kernels as intervals
+from solver.continuation.extrema.kernels.interval_kernels import look_between, middles_between
+from solver.continuation.extrema.kernels.state_change_kernels import locate_change
 from solver.continuation.extrema.node_table import NodeTable, PointRow
 from solver.continuation.folds import OnBranch
 from solver.jit.fourier import Integer, Real

@@ -2,7 +2,7 @@
 
 Within one piece of every law the curves of a branch are smooth, and points that are close enough show their
 maxima. Where a piece changes between two points, the slope may jump, turn and come back in a small share of
-the interval, and nothing at its ends tells of that (`solver.continuation.extrema.kernels.state_changes`).
+the interval, and nothing at its ends tells of that (`state_change_kernels`).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.balance.kernels.output import HIGH, LOW, MAX_ABS, PIECE
-from solver.continuation.extrema.kernels.intervals import BENT, MATTERS, STEEP, WORTH_POLISHING
+from solver.continuation.extrema.kernels.interval_kernels import BENT, MATTERS, STEEP, WORTH_POLISHING
 from solver.continuation.extrema.node_table import PointRow
 from solver.continuation.extrema.nodes import NodeSolver, numbers_of
 from solver.jit.fourier import Integer, Real

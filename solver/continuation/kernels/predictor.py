@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.balance.kernels.newton import MANY_UNKNOWNS
 from solver.contacts.kernels.system import System
-from solver.continuation.kernels.state import (
+from solver.continuation.kernels.walk_state import (
     COUNT,
     CUBIC,
     ROUGH,

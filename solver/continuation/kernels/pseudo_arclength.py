@@ -21,7 +21,7 @@ from solver.balance.kernels.output import RESIDUAL, measure, piece
 from solver.balance.kernels.residual import evaluate
 from solver.contacts.kernels.system import AT_BRANCH_POINT, SIZE, Evaluation, Receptance, System
 from solver.continuation.kernels.predictor import foreseen_step, predict
-from solver.continuation.kernels.state import (
+from solver.continuation.kernels.walk_state import (
     COUNT,
     CUBIC,
     FINISHED,

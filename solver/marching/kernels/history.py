@@ -15,7 +15,7 @@ from solver.jit.decorators import compiled
 from solver.jit.law_functions import call_force, call_rate, call_step
 from solver.jit.separate import apart
 from solver.marching.kernels.event_roots import first_fall, value_at
-from solver.marching.kernels.state import HISTORY, ORDER, Real, Series, State, System, slip
+from solver.marching.kernels.march_state import HISTORY, ORDER, Real, Series, State, System, slip
 
 PLACES = 6  # intervals of a step at whose ends the force is fitted
 _SAMPLES = 4  # samples an interval, of a law in samples

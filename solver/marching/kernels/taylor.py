@@ -21,7 +21,6 @@ import numpy as np
 
 from solver.jit.decorators import compiled
 from solver.jit.separate import apart
-from solver.marching.kernels.circle import TURN_ROWS, circle_change, circle_series, close_circle, reach
 from solver.marching.kernels.event_roots import NONE, first_fall, value_at
 from solver.marching.kernels.history import (
     advance_history,
@@ -31,7 +30,8 @@ from solver.marching.kernels.history import (
     fit_forces,
     reversal,
 )
-from solver.marching.kernels.state import (
+from solver.marching.kernels.march_circle import TURN_ROWS, circle_change, circle_series, close_circle, reach
+from solver.marching.kernels.march_state import (
     CHATTER,
     CIRCLE,
     CIRCLE_SECOND,

@@ -10,8 +10,8 @@ import re
 
 import numpy as np
 
-from solver.matrices.decks.coordinates import GLOBAL, CoordinateKind, CoordinateSystem, ansys_axes
 from solver.matrices.decks.deck import Deck, DeckFile, Members, real
+from solver.matrices.decks.deck_coordinates import GLOBAL, CoordinateKind, CoordinateSystem, ansys_axes
 from solver.matrices.readers.numbers_in_text import FormatError
 
 # Commands, by the four letters that tell them, that make, move or turn nodes in ways that are not read.

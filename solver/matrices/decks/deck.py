@@ -9,7 +9,7 @@ from typing import Annotated
 
 import numpy as np
 
-from solver.matrices.decks.coordinates import CoordinateSystem, FloatArray
+from solver.matrices.decks.deck_coordinates import CoordinateSystem, FloatArray
 from solver.matrices.readers.numbers_in_text import FormatError, fortran_real
 from solver.matrices.sectors.elements import ElementShape, Integer
 

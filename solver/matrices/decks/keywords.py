@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from solver.matrices.decks.coordinates import (
+from solver.matrices.decks.deck import Deck, DeckFile, Members, real
+from solver.matrices.decks.deck_coordinates import (
     GLOBAL,
     CoordinateKind,
     CoordinateSystem,
@@ -22,7 +23,6 @@ from solver.matrices.decks.coordinates import (
     axes_by,
     rotation,
 )
-from solver.matrices.decks.deck import Deck, DeckFile, Members, real
 from solver.matrices.readers.numbers_in_text import FormatError
 from solver.matrices.sectors.elements import elements_of, shape_of
 

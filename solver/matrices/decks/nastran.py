@@ -12,8 +12,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from solver.matrices.decks.coordinates import GLOBAL, CoordinateKind, CoordinateSystem, FloatArray, axes_by
 from solver.matrices.decks.deck import Deck, DeckFile, real
+from solver.matrices.decks.deck_coordinates import (
+    GLOBAL,
+    CoordinateKind,
+    CoordinateSystem,
+    FloatArray,
+    axes_by,
+)
 from solver.matrices.readers.numbers_in_text import FormatError
 
 _KINDS = {"R": CoordinateKind.RECTANGULAR, "C": CoordinateKind.CYLINDRICAL, "S": CoordinateKind.SPHERICAL}

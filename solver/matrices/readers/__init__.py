@@ -1,1 +1,1 @@
-"""Readers of matrix files: one format a file, put into one registry (`solver.matrices.readers.registry`)."""
+"""Readers of matrix files: one format a file, put into one registry (`reader_registry`)."""

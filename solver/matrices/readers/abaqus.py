@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.matrices.labels import Label, component, distinct, label, node_number
-from solver.matrices.readers.arrays import MOST_ROWS, Labelled, mirrored
+from solver.matrices.readers.array_parts import MOST_ROWS, Labelled, mirrored
 from solver.matrices.readers.numbers_in_text import LARGEST, FormatError, ascii_lines, table, whole_numbers
 from solver.matrices.readers.reader import Reader
 

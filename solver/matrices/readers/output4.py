@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
-from solver.matrices.readers.arrays import MOST_ROWS, chosen_by_initials, mirrored, named_by_role
+from solver.matrices.readers.array_parts import MOST_ROWS, chosen_by_initials, mirrored, named_by_role
 from solver.matrices.readers.numbers_in_text import FormatError, ascii_lines, fortran_real
 from solver.matrices.readers.reader import Reader
 

@@ -54,7 +54,7 @@ class Reader:
     matrix: Annotated[
         Callable[[Path, str], Any] | None,
         "Reads the matrix of a key (``M``, ``K``, ``C``) from a file: an array, a sparse array, or a "
-        "`solver.matrices.readers.arrays.Labelled` with the node and component of each row. It may raise "
+        "`array_parts.Labelled` with the node and component of each row. It may raise "
         "any error whose message says where the file is damaged.",
     ] = None
     names: Annotated[

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
 
 from solver.errors import FieldError
+from solver.matrices.matrix_validation import DofTable, one_triangle
 from solver.matrices.reduction.fixed_interface_modes import held_modes, interior
 from solver.matrices.reduction.reduction_error import Quality, measured
-from solver.matrices.validation import DofTable, one_triangle
 from solver.matrices.values import ASYMMETRY, MOST_DOFS
 
 Array = NDArray[Any]  # real, or complex where the matrices are Hermitian: a nodal diameter of a disk

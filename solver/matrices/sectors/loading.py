@@ -14,15 +14,15 @@ from solver.errors import UNSAID, Place, SceneError
 from solver.matrices.decks.deck import frames
 from solver.matrices.labels import COMPONENTS, OWN_COMPONENTS, Label
 from solver.matrices.load_set import MatrixSet
+from solver.matrices.matrix_validation import DofTable
 from solver.matrices.readers.numbers_in_text import FormatError
 from solver.matrices.readers.reader import MatrixFileError
 from solver.matrices.sectors.decks import Deck, read_deck
 from solver.matrices.sectors.elimination import Elimination, Group, elimination, rotation
 from solver.matrices.sectors.outline import SectorOutline, outline_of
 from solver.matrices.sectors.pairing import PAIR_BY, Pairs, groups, paired
-from solver.matrices.sectors.parts import WHOLE
-from solver.matrices.sectors.reduction import ReducedSector, diameters_met, read_sector, reduce_sector
-from solver.matrices.validation import DofTable
+from solver.matrices.sectors.sector_parts import WHOLE
+from solver.matrices.sectors.sector_reduction import ReducedSector, diameters_met, read_sector, reduce_sector
 from solver.matrices.values import MOST_DOFS, Matrix
 
 FILE_KEYS = ("low", "high", "nodes", "pair_by", "tolerance", "keep_modes")

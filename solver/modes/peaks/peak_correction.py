@@ -22,8 +22,8 @@ from solver.errors import SettingError
 from solver.jit.fourier import Complex
 from solver.modes.corrector import Corrected, ModeState, correct
 from solver.modes.held_amplitude import Held
+from solver.modes.mode_records import Recorder
 from solver.modes.nonlinear_mode import pose
-from solver.modes.records import Recorder
 from solver.results.told import Piece
 
 if TYPE_CHECKING:

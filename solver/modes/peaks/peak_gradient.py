@@ -20,8 +20,8 @@ import numpy as np
 
 from solver.jit.fourier import Complex, Real
 from solver.modes.corrector import Corrected, ModeState, correct, scales
-from solver.modes.equations import Evaluated
-from solver.modes.gradient import ModeSensitivities
+from solver.modes.mode_equations import Evaluated
+from solver.modes.mode_gradient import ModeSensitivities
 from solver.modes.nonlinear_mode import pose
 from solver.modes.peaks.performance import PerformanceCurve, crossing
 from solver.results.told import Piece

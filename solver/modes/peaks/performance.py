@@ -20,8 +20,8 @@ import numpy as np
 
 from solver.errors import SettingError
 from solver.jit.fourier import Real
+from solver.modes.mode_results import NonlinearMode
 from solver.modes.nonlinear_mode import pose
-from solver.modes.results import NonlinearMode
 from solver.results.base import Drawn
 from solver.results.views import Data, Views
 from solver.scene.bodies.kinematics import static_forces

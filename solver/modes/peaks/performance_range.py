@@ -9,9 +9,9 @@ import numpy as np
 
 from solver.errors import SettingError
 from solver.jit.fourier import Real
+from solver.modes.mode_start import LinearMode, coordinates_of, linear_modes
 from solver.modes.nonlinear_mode import nonlinear_mode, pose
 from solver.modes.peaks.performance import PerformanceCurve, excitations_of, performance_curve
-from solver.modes.start import LinearMode, coordinates_of, linear_modes
 from solver.scene.scene import Scene
 
 _BELOW, _BEYOND = 0.5, 3.0  # of the amplitudes that the least and the largest excitation make

@@ -27,8 +27,8 @@ from solver.continuation.extrema.node_table import PointRow
 from solver.continuation.extrema.nodes import NodeSolver
 from solver.continuation.folds import fold_between
 from solver.continuation.marks import Bifurcations, Mark, MarkKind
-from solver.jit.clock import clock
 from solver.jit.fourier import Real
+from solver.jit.timer import clock
 from solver.response.stability.floquet import branch_stability
 from solver.response.stability.multipliers import Growth
 

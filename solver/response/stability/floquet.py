@@ -10,8 +10,8 @@ from solver.contacts.pieces.piece import ContactPart
 from solver.continuation.branch import Branch
 from solver.errors import SettingError
 from solver.jit import fourier
-from solver.jit.clock import clock
 from solver.jit.fourier import Complex, Real
+from solver.jit.timer import clock
 from solver.lab import from_lab
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_counts

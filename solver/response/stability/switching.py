@@ -19,9 +19,9 @@ from solver.balance.kernels.newton import arc_newton
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import AnyBranch, Branch
 from solver.continuation.branches.sweep import sweep
+from solver.continuation.continuation_settings import ContinuationSettings
 from solver.continuation.marks import Mark, MarkKind
 from solver.continuation.segment import Course
-from solver.continuation.settings import ContinuationSettings
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.response.stability.bifurcations import bifurcations

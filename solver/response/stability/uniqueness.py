@@ -37,7 +37,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.contacts.laws.base import AnyContact
+from solver.contacts.laws.contact_law import AnyContact
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_counts

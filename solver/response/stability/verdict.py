@@ -11,7 +11,7 @@ import math
 from typing import TYPE_CHECKING
 
 from solver.continuation.branch import Branch
-from solver.continuation.peaks import Peak
+from solver.continuation.peak import Peak
 from solver.errors import SettingError
 from solver.lab import LAB, from_lab, is_there
 from solver.linear.assembly import linear_model

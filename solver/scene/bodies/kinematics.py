@@ -20,11 +20,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from solver.contacts.fields import NEXT, Between, Vector, parse_end
 from solver.contacts.frames import cross, unit
-from solver.contacts.laws.base import AnyContact
+from solver.contacts.laws.contact_law import AnyContact
 from solver.scene.bodies.body import REVOLUTIONS, Body, Load, Node, Place
-from solver.scene.parts import Excitation, LumpedStructure, Structure
 from solver.scene.scene_parameter import Forces, Term
 from solver.scene.scene_parameter import Form as Form
+from solver.scene.scene_records import Excitation, LumpedStructure, Structure
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene

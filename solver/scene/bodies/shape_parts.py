@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from solver.contacts.laws.base import AnyContact
+from solver.contacts.laws.contact_law import AnyContact
 from solver.errors import SettingError
+from solver.scene.bodies.body_shapes import POINTS, AnyShape
 from solver.scene.bodies.kinematics import placed_forms
 from solver.scene.bodies.paths import BODY_UNITS, body_parameter
-from solver.scene.bodies.shapes import POINTS, AnyShape
-from solver.scene.parts import ContactOfAnyLaw
 from solver.scene.scene_parameter import ActsOn, Form, SceneParameter, Slope, Term
+from solver.scene.scene_records import ContactOfAnyLaw
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Annotated, Any, TypeVar
 
-from solver.contacts.laws.harmonics import is_phase
+from solver.contacts.laws.load_harmonics import is_phase
 from solver.errors import SettingError
-from solver.matrices.validation import DofTable
+from solver.matrices.matrix_validation import DofTable
 from solver.matrices.values import MOST_DOFS, Matrix
 from solver.results.told import Piece
 from solver.scene.bodies.kinematics import forms_of, written_form
@@ -25,7 +25,6 @@ from solver.scene.cyclic.sector_blocks import (
 )
 from solver.scene.linear_terms import Coupling, LinearTerm
 from solver.scene.parameter_paths import changed_quantities
-from solver.scene.parts import Recovered
 from solver.scene.scene import (
     AnyContact,
     Body,
@@ -43,6 +42,7 @@ from solver.scene.scene import (
     Structure,
     parse_end,
 )
+from solver.scene.scene_records import Recovered
 from solver.scene.structure_parameters import NUMBERS, TABLES
 from solver.wording import listing
 

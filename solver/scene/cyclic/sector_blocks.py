@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from solver.errors import SettingError
 from solver.matrices.sectors.elimination import Circulant, Elimination, elimination
-from solver.matrices.sectors.parts import WHOLE, PartsAcross
+from solver.matrices.sectors.sector_parts import WHOLE, PartsAcross
 
 if TYPE_CHECKING:
     from solver.scene.matrices_structure import MatricesStructure

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.matrices.matrix_validation import DofTable, check_definite
 from solver.matrices.sectors.diameters import DiameterMatrices
 from solver.matrices.sectors.elimination import Elimination, elimination
-from solver.matrices.sectors.parts import PartMatrices
-from solver.matrices.validation import DofTable, check_definite
+from solver.matrices.sectors.sector_parts import PartMatrices
 from solver.matrices.values import Matrix
 
 if TYPE_CHECKING:

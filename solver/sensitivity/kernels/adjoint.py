@@ -23,7 +23,7 @@ from solver.balance.kernels.output import SAME_HEIGHT, extremes, observed_motion
 from solver.balance.kernels.residual import contact_values, evaluate
 from solver.balance.kernels.slopes import springs_of
 from solver.contacts.kernels.columns import KT, MU
-from solver.contacts.kernels.coulomb.force import contact_force
+from solver.contacts.kernels.coulomb.line_force import contact_force
 from solver.contacts.kernels.stick_slip_events import FAILED
 from solver.contacts.kernels.system import FROM_REST, UTILISED, Evaluation, Receptance, System
 from solver.jit.decorators import compiled

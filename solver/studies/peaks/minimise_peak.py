@@ -17,17 +17,17 @@ from solver.balance.simplifications import Effects
 from solver.continuation.branch import BranchStatus
 from solver.errors import SettingError, check_count
 from solver.first_use import renamed
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.results.watch import shows_progress
 from solver.scene.scene import Scene
 from solver.studies.peaks.envelope_minimum import DOUBT, Lowest, flat, minima, rows_at
-from solver.studies.peaks.plateau import Plateau, all_level, choose, dips, interval, look_at
+from solver.studies.peaks.peak_plateau import Plateau, all_level, choose, dips, interval, look_at
 from solver.studies.peaks.proof import judge, result_of, seen
 from solver.studies.peaks.refine_tracks import tighten
-from solver.studies.peaks.results import ChosenBy, LeastPeak, TrackStatus
 from solver.studies.peaks.secondary_minima import NEAR, with_further
 from solver.studies.peaks.survey import OnLook
 from solver.studies.peaks.track import TrackingPace
+from solver.studies.peaks.track_results import ChosenBy, LeastPeak, TrackStatus
 from solver.studies.peaks.tracker import Tracker
 from solver.studies.peaks.work_limit import RESPONSES, Allowance, HaltedError
 

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, OMEGA, Z
-from solver.jit.clock import clock
 from solver.jit.fourier import Real
+from solver.jit.timer import clock
 from solver.studies.peaks.envelope_minimum import Lowest, flat, rows_at
-from solver.studies.peaks.results import ActivePeak, Basin, ChosenBy, LeastPeak, TrackStatus
 from solver.studies.peaks.track import Look
+from solver.studies.peaks.track_results import ActivePeak, Basin, ChosenBy, LeastPeak, TrackStatus
 from solver.studies.peaks.tracker import Tracker
 
 if TYPE_CHECKING:
-    from solver.studies.peaks.plateau import Plateau
+    from solver.studies.peaks.peak_plateau import Plateau
 
 HIGHER = 1e-7  # relative height by which a sweep must exceed the lines to count as higher
 EQUAL = 1e-7  # relative distance within which peaks count as equally high

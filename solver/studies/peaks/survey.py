@@ -14,12 +14,12 @@ from solver.balance.balance import build
 from solver.balance.simplifications import Effects
 from solver.continuation.branch import Branch
 from solver.continuation.parameter_scale import scale_of
-from solver.continuation.peaks import Peak
+from solver.continuation.peak import Peak
 from solver.jit.fourier import Real
 from solver.scene.scene import Scene
-from solver.studies.peaks.results import TrackStatus
 from solver.studies.peaks.seeds import Line
 from solver.studies.peaks.track import Glance, Look, TrackingPace, glance_at, sweep_within
+from solver.studies.peaks.track_results import TrackStatus
 from solver.studies.peaks.work_limit import Allowance, HaltedError
 
 SAME = (

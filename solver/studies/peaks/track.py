@@ -17,13 +17,13 @@ from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Branch
 from solver.continuation.branches.sweep import sweep, walk
+from solver.continuation.continuation_settings import ContinuationSettings
 from solver.continuation.extrema.candidates import Rival, crests
-from solver.continuation.peaks import Peak
+from solver.continuation.peak import Peak
 from solver.continuation.segment import Course, Stretch
-from solver.continuation.settings import ContinuationSettings
 from solver.jit.fourier import Integer
 from solver.scene.scene import Scene
-from solver.studies.peaks.results import TrackStatus
+from solver.studies.peaks.track_results import TrackStatus
 from solver.studies.peaks.work_limit import Allowance, HaltedError
 
 

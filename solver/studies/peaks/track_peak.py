@@ -15,14 +15,14 @@ import numpy as np
 from solver.balance.simplifications import Effects
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, OMEGA, Z
 from solver.errors import check_count
-from solver.jit.clock import clock
 from solver.jit.fourier import Real
+from solver.jit.timer import clock
 from solver.results.watch import shows_progress
 from solver.scene.scene import Scene
 from solver.studies.peaks.minimise_peak import COMPETES, MOST_LOOKS, THOROUGHLY, halted, prove
 from solver.studies.peaks.proof import EQUAL
-from solver.studies.peaks.results import CompetingPeak, Exchange, LeastPeak, PeakTrack, TrackStatus
 from solver.studies.peaks.seeds import Line, LineEnd
+from solver.studies.peaks.track_results import CompetingPeak, Exchange, LeastPeak, PeakTrack, TrackStatus
 from solver.studies.peaks.tracker import Tracker
 from solver.studies.peaks.work_limit import RESPONSES, Allowance, HaltedError
 

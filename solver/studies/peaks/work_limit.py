@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from solver.jit.clock import clock
-from solver.studies.peaks.results import TrackStatus
+from solver.jit.timer import clock
+from solver.studies.peaks.track_results import TrackStatus
 
 RESPONSES = 100.0  # frequency responses whose work may be spent
 LEAST_UNIT = 200.0  # Newton iterations: a response that is nearly linear takes fewer

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 from matplotlib.figure import Figure
 
 from solver.continuation.branch import AnyBranch
-from solver.marching.result import MarchResult
+from solver.marching.march_result import MarchResult
 from solver.modes.peaks.performance import PerformanceCurve
 from solver.response.solution import Solution
 from solver.response.stability.multipliers import Stability
 from solver.results.measures import Measured
 from solver.scene.scene import Scene
 from solver.studies.blades import BladeAmplitudes, BladePeaks
-from solver.studies.peaks.results import PeakTrack
+from solver.studies.peaks.track_results import PeakTrack
 from solver.views.plots.curves import Response
 from solver.views.plots.disks import blades_figure
 from solver.views.plots.modes import performance_figure

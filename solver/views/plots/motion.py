@@ -16,7 +16,7 @@ from solver.views.plots.curves import FloatArray
 from solver.views.plots.style import Into
 
 if TYPE_CHECKING:
-    from solver.marching.result import MarchResult
+    from solver.marching.march_result import MarchResult
     from solver.response.solution import Solution
     from solver.response.stability.multipliers import Stability
 

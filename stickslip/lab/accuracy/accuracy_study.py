@@ -26,7 +26,7 @@ from solver.jit.fourier import Real
 from solver.lab import LAB, from_lab, is_there
 from solver.response.solve import solve
 from solver.results.watch import ShouldStop, shows_progress
-from solver.scene.harmonics import kept_harmonics
+from solver.scene.scene_harmonics import kept_harmonics
 from solver.scene.parameter_paths import check_frequency
 from solver.scene.scene import Scene
 from stickslip.lab.accuracy.accuracy_result import AccuracyRow, AccuracyStatus, AccuracyStudy

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
-from service.jobs.common.results import answered
-from service.jobs.common.scenes import FrequencyHz, Harmonics, check
-from service.jobs.figures import SweepRecord
-from service.jobs.registry import Flag
+from service.jobs.common.result_models import answered
+from service.jobs.common.scene_requests import FrequencyHz, Harmonics, check
+from service.jobs.stored_figures import SweepRecord
+from service.jobs.kind_registry import Flag
 from service.jobs.study import Study
 from solver.errors import Issue
 
@@ -79,6 +79,6 @@ class Accuracy(Study):
     @classmethod
     def sweeps(cls, found: AccuracyStudy) -> tuple[SweepRecord, ...]:
         """Return the response that found the peak, if one did."""
-        from service.jobs.common.records import sweep_records
+        from service.jobs.common.sweep_records import sweep_records
 
         return () if found.branch is None else sweep_records([found.branch], intermediate=True)

@@ -17,7 +17,7 @@ from solver.balance.balance import build
 from solver.balance.simplifications import Effects
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.errors import SettingError, check_count
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.response.solution import Solution
 from solver.response.solve import describe
 from solver.response.stability import MOST_STARTS

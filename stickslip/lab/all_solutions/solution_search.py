@@ -25,7 +25,7 @@ from solver.continuation.branch import BranchStatus, Points
 from solver.continuation.branches.sweep import walk
 from solver.continuation.marks import MarkKind
 from solver.continuation.segment import Stretch, joined
-from solver.continuation.settings import ContinuationSettings
+from solver.continuation.continuation_settings import ContinuationSettings
 from solver.jit.fourier import Real, from_full, to_full
 from solver.response.stability.bifurcations import Along
 from solver.response.stability.switching import leaving

@@ -17,14 +17,14 @@ from optim.criteria.mass import MASS
 from optim.errors import DesignError
 from optim.methods.kkt import KEPT
 from optim.problem.cases import refuse_displaced
-from optim.problem.problem import Problem, pose
+from optim.problem.design_problem import Problem, pose
 from optim.problem.variables import NOTHING, parameter_values
 from optim.problem.words import Method
-from optim.results.design import DesignResult, DesignStatus
-from optim.results.parts import CatalogueOption, OptionStatus
+from optim.results.design_result import DesignResult, DesignStatus
+from optim.results.design_parts import CatalogueOption, OptionStatus
 from optim.search import solve_problem
 from solver.errors import Place, at
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.results.told import Piece
 from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.scene import Scene

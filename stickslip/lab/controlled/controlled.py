@@ -10,15 +10,15 @@ import numpy as np
 
 from solver.balance.speed_line import check_no_line
 from solver.errors import SettingError
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.jit.fourier import Real
 from solver.modes.corrector import Corrected
-from solver.modes.curve import FollowedCurve, follow
+from solver.modes.mode_curve import FollowedCurve, follow
 from solver.modes.held_amplitude import Held, first_held, least_force
 from solver.response.stability.cost import left_out
 from solver.modes.nonlinear_mode import LEAST, MOST_POINTS, pose
-from solver.modes.records import PointRecord, Recorder, Wider, last_unknowns, told_of
-from solver.modes.results import HeldAmplitude, HeldStatus, LeastForce
+from solver.modes.mode_records import PointRecord, Recorder, Wider, last_unknowns, told_of
+from solver.modes.mode_results import HeldAmplitude, HeldStatus, LeastForce
 from solver.response.stability.floquet import motions_stability
 from solver.scene.parameter_paths import check_frequency
 

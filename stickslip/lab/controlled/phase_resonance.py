@@ -1,6 +1,6 @@
 """Phase resonance: the forced responses whose harmonic 1 lags the excitation by a quarter of a period.
 
-The equations are those of the extended periodic motion (`solver.modes.equations`) with the excitation f in
+The equations are those of the extended periodic motion (`mode_equations`) with the excitation f in
 place of the artificial damping, Z_1 x_1 + Lᴴ F_1 = p f, at a given modal amplitude a: what a test with a
 controlled phase and amplitude measures (S. Peter, R. I. Leine, Mech. Syst. Signal Process. 96 (2017) 139,
 doi:10.1016/j.ymssp.2017.04.011).
@@ -19,14 +19,14 @@ import numpy as np
 
 from solver.balance.speed_line import check_no_line
 from solver.errors import SettingError
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.jit.fourier import Complex, Real
-from solver.modes.curve import follow
-from solver.modes.equations import Evaluated, Forced
+from solver.modes.mode_curve import follow
+from solver.modes.mode_equations import Evaluated, Forced
 from solver.modes.nonlinear_mode import MOST_POINTS, check_amplitudes, pose
-from solver.modes.records import Recorder, last_unknowns, told_of
-from solver.modes.results import NonlinearModeStatus, PhaseResonance
-from solver.modes.start import begin, coordinates_of
+from solver.modes.mode_records import Recorder, last_unknowns, told_of
+from solver.modes.mode_results import NonlinearModeStatus, PhaseResonance
+from solver.modes.mode_start import begin, coordinates_of
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field
 
 from optim.criteria.key import Name
-from service.jobs.common.results import Table, answered
-from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, PositiveNumber
+from service.jobs.common.result_models import Table, answered
+from service.jobs.common.scene_requests import FrequencyHz, HarmonicRequest, PositiveNumber
 from service.jobs.common.sizes import balance_issues
 from service.jobs.common.study_keys import band_issues
-from service.jobs.registry import Flag
+from service.jobs.kind_registry import Flag
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
 
@@ -31,7 +31,7 @@ class Controlled(Study, HarmonicRequest):
     EXAMPLES = ({"scene": "two-dof", "amplitude": 1.0},)
     NAME, FUNCTION = "controlled", "solver:held_amplitude"
     RESULT = answered(
-        "solver.modes.results:HeldAmplitude",
+        "solver.modes.mode_results:HeldAmplitude",
         "ControlledResult",
         changes=list[Table],
         least=Table | None,

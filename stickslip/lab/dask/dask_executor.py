@@ -25,9 +25,9 @@ from service.db.repositories import Attempt
 from service.errors import UnknownKindError
 from service.jobs.checkpoints import KeptPieces
 from service.jobs.outputs import Pace
-from service.jobs.registry import Registry
+from service.jobs.kind_registry import Registry
 from service.settings.settings import Settings
-from service.workers.base import ExecutorStatus, Failed, Finished, Lost, Outcome, Sink, Stopped
+from service.workers.executor import ExecutorStatus, Failed, Finished, Lost, Outcome, Sink, Stopped
 from stickslip.lab.dask.cluster import Cluster, answer_of
 from service.workers.process_limits import UNLIMITED, ProcessLimits
 from stickslip.lab.dask.tasks import Order, TaskAnswer

@@ -16,8 +16,8 @@ from typing import Annotated
 
 import numpy as np
 
-from solver.contacts.laws.base import AnyContact
-from solver.contacts.laws.parts import Follows, Row
+from solver.contacts.laws.contact_law import AnyContact
+from solver.contacts.laws.contact_parts import Follows, Row
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
 from solver.linear.assembly import check_structure, linear_model

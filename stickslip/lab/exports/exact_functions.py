@@ -23,7 +23,7 @@ from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Sensitivities
 from solver.sensitivity.nonsmooth import peak_gradient
 from solver.studies.peaks.minimise_peak import least_peak as minimise_peak
-from solver.studies.peaks.results import ActivePeak
+from solver.studies.peaks.track_results import ActivePeak
 
 FREQUENCY = "frequency"
 AMPLITUDE = "amplitude"

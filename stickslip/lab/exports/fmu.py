@@ -22,7 +22,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from stickslip.lab.exports.equations_of_motion import EquationsOfMotion, equations_of
-from solver.contacts.laws.parts import Follows
+from solver.contacts.laws.contact_parts import Follows
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.results.files import whole

@@ -23,8 +23,8 @@ from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
 from solver.modes.along import CurveSegment, points_of, with_turns, zeta_of
 from solver.modes.corrector import Corrected
-from solver.modes.curve import CurveEnd, follow
-from solver.modes.equations import Equations
+from solver.modes.mode_curve import CurveEnd, follow
+from solver.modes.mode_equations import Equations
 from stickslip.lab.limit_cycles.more_harmonics_of_cycles import (
     PERIOD,
     SAFETY,
@@ -35,9 +35,9 @@ from stickslip.lab.limit_cycles.more_harmonics_of_cycles import (
 )
 from solver.modes.nonlinear_mode import MOST_POINTS, ModeProblem, pose
 from solver.modes.peaks.performance import grows_together
-from solver.modes.records import PointRecord
-from solver.modes.results import NonlinearMode
-from solver.modes.start import begin
+from solver.modes.mode_records import PointRecord
+from solver.modes.mode_results import NonlinearMode
+from solver.modes.mode_start import begin
 from solver.response.stability.cost import left_out
 from solver.response.stability.multipliers import GROWS, growth_of
 from solver.results.told import Piece

@@ -18,9 +18,9 @@ from solver.errors import SettingError
 from solver.jit.fourier import Complex
 from solver.modes.along import with_turns, zeta_of
 from solver.modes.corrector import Corrected, ModeState, correct
-from solver.modes.curve import CurveEnd, follow, tangent_of
-from solver.modes.equations import Equations
-from solver.modes.records import PointRecord, Recorder, Wider
+from solver.modes.mode_curve import CurveEnd, follow, tangent_of
+from solver.modes.mode_equations import Equations
+from solver.modes.mode_records import PointRecord, Recorder, Wider
 from solver.response.stability.floquet import scene_monodromy
 from solver.scene.scene import Scene
 

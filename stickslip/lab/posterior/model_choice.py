@@ -21,7 +21,7 @@ from stickslip.lab.posterior.posterior import posterior
 from stickslip.lab.posterior.posterior_result import Posterior
 from stickslip.lab.posterior.sampling import SAMPLING, Sampling
 from optim.identification.reading import Given
-from optim.problem.numbers import is_number
+from optim.problem.problem_numbers import is_number
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn
 from solver.results.told import Piece

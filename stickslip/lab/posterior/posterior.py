@@ -22,7 +22,7 @@ from optim.identification.reading import Given, read_data
 from optim.identification.unknowns import read_unknowns
 from optim.problem.variables import Real
 from solver.balance.parameter import resolve
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 

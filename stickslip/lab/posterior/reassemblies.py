@@ -32,7 +32,7 @@ from optim.identification.unknowns import Unknowns, read_unknowns
 from optim.problem.variables import Real
 from solver.arrays import FloatOrNaN
 from solver.balance.parameter import resolve
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.results.base import Drawn
 from solver.results.views import Data, Views
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress

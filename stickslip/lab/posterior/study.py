@@ -10,12 +10,19 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Field, RootModel
 
 from optim.criteria.key import Name, Pair, PositiveNumber
-from optim.problem.keys import MAX_VARIABLES, VariableName
+from optim.problem.problem_keys import MAX_VARIABLES, VariableName
 from service.errors import InvalidRequestError
-from service.jobs.common.results import answered
-from service.jobs.common.scenes import MOST_SET, SceneReference, SetValues, require, resolve_scene, resolved
-from service.jobs.registry import Flag, JobKind, Json, Resolved, SceneSource
-from service.jobs.studies.identify import MOST_TABLES, Measured
+from service.jobs.common.result_models import answered
+from service.jobs.common.scene_requests import (
+    MOST_SET,
+    SceneReference,
+    SetValues,
+    require,
+    resolve_scene,
+    resolved,
+)
+from service.jobs.kind_registry import Flag, JobKind, Json, Resolved, SceneSource
+from service.jobs.studies.identify_study import MOST_TABLES, Measured
 from service.jobs.study import Answer, Watch
 from solver.errors import Issue
 

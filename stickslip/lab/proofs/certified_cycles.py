@@ -19,7 +19,7 @@ from stickslip.lab.proofs.certificate import (
     tried,
 )
 from solver.errors import SettingError
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.jit.fourier import to_complex
 from solver.linear.assembly import linear_model
 from stickslip.lab.proofs.exact.orbit_at_point import begun_at

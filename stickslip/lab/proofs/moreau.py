@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from solver.errors import SettingError
 from solver.marching.contacts import as_sparse
-from solver.marching.equations import MarchEquations
+from solver.marching.march_equations import MarchEquations
 from stickslip.lab.proofs.kernels import moreau_steps as stepping
-from solver.marching.kernels import state as kernel
-from solver.marching.result import MarchStatus
+from solver.marching.kernels import march_state as kernel
+from solver.marching.march_result import MarchStatus
 
 FloatArray = NDArray[np.float64]
 ORDER = 2  # of the steps; where a load is a mean over the step, 1

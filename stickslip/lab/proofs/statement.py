@@ -10,13 +10,13 @@ import numpy as np
 
 from stickslip.lab.proofs.checker import Orbit as CheckedOrbit
 from stickslip.lab.proofs.checker import System
-from solver.contacts.laws.parts import Follows, Row
+from solver.contacts.laws.contact_parts import Follows, Row
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
 from solver.linear.structure_matrices import elements_of
 from stickslip.lab.proofs.exact.flow import FlowPiece
 from stickslip.lab.proofs.exact.piecewise import FREE, STICK, MemberState, Piecewise
-from solver.scene.parts import LumpedStructure
+from solver.scene.scene_records import LumpedStructure
 
 _AT_ONCE = 1e-7  # rad: events this near each other may be one
 _HARDLY = 1e-5  # rad: a slip that is shorter may be none

@@ -26,7 +26,7 @@ from solver.balance.simplifications import even_harmonics_reason
 from solver.balance.workspace import Workspace
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.errors import SettingError
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.jit.fourier import Integer
 from stickslip.lab.quasi_periodic.quasi_periodic_result import LINES, QuasiPeriodic, QuasiPeriodicStatus
 from solver.response.solution import MEAN_UNDETERMINED, Solution
@@ -34,7 +34,7 @@ from solver.response.solve import describe, solve
 from stickslip.lab.quasi_periodic.torus import NOWHERE, ContactMotions, Torus, sizes_on, torus_of
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.excitation import Excitation
-from solver.scene.harmonics import MOST_HARMONICS
+from solver.scene.scene_harmonics import MOST_HARMONICS
 from solver.scene.parameter_paths import check_frequency
 from solver.scene.scene import Scene
 

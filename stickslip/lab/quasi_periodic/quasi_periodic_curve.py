@@ -11,7 +11,7 @@ import numpy as np
 
 from solver.arrays import Real
 from solver.errors import SettingError, check_count
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from stickslip.lab.quasi_periodic.quasi_periodic import Question, TorusWatch, check, respond, second_force
 from stickslip.lab.quasi_periodic.quasi_periodic_result import QuasiPeriodic, QuasiPeriodicStatus
 from solver.results.base import Drawn

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import BaseModel, Field, RootModel
 
 from optim.criteria.key import Name
-from service.jobs.common.results import answered
-from service.jobs.common.scenes import LEAST, FrequencyHz, HarmonicRequest, Number, check
+from service.jobs.common.result_models import answered
+from service.jobs.common.scene_requests import LEAST, FrequencyHz, HarmonicRequest, Number, check
 from service.jobs.common.sizes import balance_issues
-from service.jobs.registry import Flag, Json
+from service.jobs.kind_registry import Flag, Json
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from service.errors import ConfigurationError, DatabaseError
 from service.db.upload_files import to_disk
-from service.jobs.figures import StoredArray
+from service.jobs.stored_figures import StoredArray
 
 OUTSIDE_BYTES = 1 << 14
 """Smaller arrays stay in the database: a file of their own would cost more than they do."""

@@ -19,7 +19,7 @@ import numpy as np
 from solver.arrays import FloatOrNaN, Real
 from solver.continuation.parameter_scale import scale_of
 from solver.errors import SettingError, check_count
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.results.base import Shown
 from solver.results.views import Data, Views
 from solver.results.watch import OnProgress, ShouldStop, shows_progress

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from pydantic import Field
 
 from optim.criteria.key import FrequencyHz, Name, ParameterPath
-from service.jobs.common.results import Curve, Table, answered
-from service.jobs.common.scenes import HarmonicRequest, NotNegative, Number, PositiveNumber, check
+from service.jobs.common.result_models import Curve, Table, answered
+from service.jobs.common.scene_requests import HarmonicRequest, NotNegative, Number, PositiveNumber, check
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
-from service.jobs.registry import Flag
+from service.jobs.kind_registry import Flag
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
 

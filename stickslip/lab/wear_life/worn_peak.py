@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import BeforeValidator, WithJsonSchema
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key
-from optim.criteria.peak import COMPETES
+from optim.criteria.peak_criterion import COMPETES
 
 if TYPE_CHECKING:
     from stickslip.lab.wear_life.mission import Mission
@@ -91,7 +91,7 @@ def _when(hours: float, asked: WornLife) -> str:
 def _read(asked: CriterionContext) -> WornLife:
     """The life, checked against the scene."""
     from optim.errors import DesignError
-    from optim.problem.numbers import positive
+    from optim.problem.problem_numbers import positive
     from solver.errors import SettingError
     from stickslip.lab.wear_life.least_worn_peak import checked_factors, checked_since
     from stickslip.lab.wear_life.life import course_of

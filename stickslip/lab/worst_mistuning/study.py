@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from pydantic import Field
 
 from optim.criteria.key import Name
-from service.jobs.common.results import Table, answered
-from service.jobs.common.scenes import LEAST, FrequencyHz, HarmonicRequest
+from service.jobs.common.result_models import Table, answered
+from service.jobs.common.scene_requests import LEAST, FrequencyHz, HarmonicRequest
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.common.study_keys import band_issues
-from service.jobs.registry import Flag
-from service.jobs.studies.mistuning import PartNames, disk_issues, part_issues
+from service.jobs.kind_registry import Flag
+from service.jobs.studies.mistuning_study import PartNames, disk_issues, part_issues
 from service.jobs.study import Study
 from solver.errors import Issue
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from solver.arrays import Real
 from solver.errors import SettingError
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.response.band_end import of_frequency
 from solver.results.notes import notes_of_all
 from solver.results.watch import OnProgress, ShouldStop, shows_progress

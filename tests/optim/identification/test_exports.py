@@ -11,7 +11,7 @@ from optim.errors import DataError
 from optim.identification.readers.csv_text import read_text
 from optim.identification.readers.encodings import text_of
 from optim.identification.readers.headings import Choice, guesses
-from optim.identification.readers.layout import layout_of
+from optim.identification.readers.text_layout import layout_of
 from optim.identification.reading import read_data, with_columns
 
 SCENE = solver.load_scene("bladed-disk")

@@ -18,7 +18,7 @@ from optim.identification.data.response import ResponseRun
 from optim.identification.readers.csv_text import read_text
 from optim.identification.readers.encodings import decoded
 from optim.identification.readers.headings import Choice, guesses
-from optim.identification.readers.layout import layout_of
+from optim.identification.readers.text_layout import layout_of
 from optim.identification.reading import job_tables, read_data, with_columns
 from solver.errors import SceneError
 

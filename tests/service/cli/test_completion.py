@@ -12,7 +12,7 @@ import pytest
 from launch import COMMAND
 
 import solver
-from optim.problem.problem import Method
+from optim.problem.design_problem import Method
 from service.cli import main
 from service.jobs.common.study_keys import WORDS
 from solver.scene.parameter_paths import parameter_paths

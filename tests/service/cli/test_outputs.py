@@ -13,8 +13,8 @@ import optim
 import solver
 from service.cli import main
 from service.jobs.drawing import result_figure
+from service.jobs.kind_registry import NothingToDrawError
 from service.jobs.kinds import SHIPPED
-from service.jobs.registry import NothingToDrawError
 
 COMMANDS = {
     "solve": "two-dof --frequency 1.2 --harmonics 3",

@@ -10,7 +10,7 @@ import pytest
 from light_scenes import light_scene
 
 import solver
-from service.jobs.common.scenes import linear_limit
+from service.jobs.common.scene_requests import linear_limit
 from service.jobs.kinds.previews import run_limits
 from service.jobs.outputs import Silent
 from solver.linear.assembly import linear_model

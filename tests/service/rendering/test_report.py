@@ -171,7 +171,7 @@ def test_a_report_keeps_the_matrices_of_a_job_when_the_upload_is_gone(
 
 @pytest.mark.long
 def test_a_report_of_several_cases_is_of_the_one_with_the_highest_peak() -> None:
-    from service.rendering.report.design import design_report
+    from service.rendering.report.design_report import design_report
     from service.rendering.report.sections import Designed
 
     scene = solver.load_scene("two-dof")
@@ -186,7 +186,7 @@ def test_a_report_of_several_cases_is_of_the_one_with_the_highest_peak() -> None
 
 
 def test_a_report_of_a_search_that_found_nothing_says_so() -> None:
-    from service.rendering.report.robust import robust_report
+    from service.rendering.report.robust_report import robust_report
     from service.rendering.report.sections import Designed
 
     scene = solver.load_scene("two-dof")
@@ -198,8 +198,8 @@ def test_a_report_of_a_search_that_found_nothing_says_so() -> None:
 
 @pytest.mark.long
 def test_a_mistuned_robust_design_shows_its_worst_blade() -> None:
-    from service.rendering.report.responses import Sweeps, in_scenario
-    from service.rendering.report.robust import robust_report
+    from service.rendering.report.responses_report import Sweeps, in_scenario
+    from service.rendering.report.robust_report import robust_report
     from service.rendering.report.sections import Designed
 
     scene = solver.load_scene("bladed-disk")
@@ -266,7 +266,7 @@ def test_without_its_extra_a_pdf_is_refused_in_words(
 @pytest.mark.long
 def test_a_report_without_linear_limits() -> None:
     """A law without a load to remove: the responses alone."""
-    from service.rendering.report.design import design_report
+    from service.rendering.report.design_report import design_report
     from service.rendering.report.sections import Designed
 
     raw = solver.load_scene("two-dof").to_dict()

@@ -24,7 +24,7 @@ from solver.balance.workspace import Workspace
 from solver.contacts.kernels.stick_slip_events import LIFTING
 from solver.continuation.branches.sweep import walk
 from solver.continuation.segment import Course
-from solver.marching.result import MarchStatus
+from solver.marching.march_result import MarchStatus
 
 LAW = 3e-4  # of the largest friction force: what sampling leaves
 BALANCED = 1e-8

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from solver.contacts.kernels.circle.law import coulomb_circle
+from solver.contacts.kernels.circle.circle_law import coulomb_circle
 from solver.contacts.kernels.columns import COLUMNS, KN, KT, KT_SECOND, MU
 from solver.contacts.kernels.stick_slip_events import (
     LIFTING,

@@ -19,7 +19,7 @@ import solver
 from solver.balance.balance import build
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels import columns
-from solver.contacts.laws.registry import laws
+from solver.contacts.laws.law_registry import laws
 from solver.jit import fourier
 
 OMEGA = 2.0 * math.pi * 0.19

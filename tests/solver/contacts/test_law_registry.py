@@ -15,8 +15,8 @@ from law_scene_cases import CUBIC, GAP, PLANE, RUB, scene
 
 from solver.contacts.kernels import columns
 from solver.contacts.kernels.laws import law_number
-from solver.contacts.laws import registry
-from solver.contacts.laws.registry import laws, register
+from solver.contacts.laws import law_registry as registry
+from solver.contacts.laws.law_registry import laws, register
 from solver.errors import SettingError
 from solver.scene.json_schema import scene_schema
 

@@ -12,7 +12,7 @@ from force_cases import NAMES, TRANSITIONS, critical, reference_case
 import solver
 from solver.balance.balance import build
 from solver.balance.workspace import Workspace
-from solver.contacts.kernels.coulomb.hessian import second_along
+from solver.contacts.kernels.coulomb.line_hessian import second_along
 from solver.contacts.kernels.system import by_reference
 from solver.continuation.extrema.kernels.amplitude_hessian import (
     balance_at,

@@ -59,11 +59,11 @@ LAWS = {
         force=COULOMB_BOX, second=_RUBBING + "box_second", ports=(0, 1), columns=(KT, KT_SECOND, MU)
     ),
     "coulomb-3d": Law(
-        force=COULOMB_CIRCLE, second="solver.contacts.kernels.circle.hessian:circle_law_second",
+        force=COULOMB_CIRCLE, second="solver.contacts.kernels.circle.circle_hessian:circle_law_second",
         ports=(0, 1, 2), columns=_SPACE,
     ),
     "coulomb-3d, one stiffness": Law(
-        force=COULOMB_CIRCLE, second="solver.contacts.kernels.circle.hessian:circle_law_second",
+        force=COULOMB_CIRCLE, second="solver.contacts.kernels.circle.circle_hessian:circle_law_second",
         ports=(0, 1, 2), columns=(KT, MU, KN), tied=True,
     ),
     "gap": Law(

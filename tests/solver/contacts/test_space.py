@@ -30,7 +30,7 @@ from space_march import CASES, matrices
 from space_referee import Contact, friction
 
 from solver.contacts.kernels import columns
-from solver.contacts.kernels.circle.law import coulomb_circle
+from solver.contacts.kernels.circle.circle_law import coulomb_circle
 from solver.contacts.kernels.columns import COLUMNS, KN, KT, KT_SECOND, MU
 from solver.contacts.kernels.stick_slip_events import (
     FAILED,

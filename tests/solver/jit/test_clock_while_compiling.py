@@ -7,7 +7,7 @@ import pytest
 from numba.core import event
 
 import solver.jit.cache  # noqa: F401 - it listens to the compiler
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 
 
 def test_the_clock_stands_still_while_something_is_compiled() -> None:

@@ -14,7 +14,7 @@ import pytest
 from recorded_kernels import TOLERANCE, kernels_called_by_tests
 
 import solver
-from solver.contacts.kernels.coulomb import force
+from solver.contacts.kernels.coulomb import line_force as force
 
 ROOT = Path(__file__).parent.parent.parent.parent
 INTERPRETED = {

@@ -13,7 +13,7 @@ from solver.marching import march as marching
 from solver.marching.kernels import taylor as kernel
 from solver.marching.kernels.event_roots import NONE, first_fall
 from solver.marching.march import MarchResult, march
-from solver.marching.result import MarchStatus
+from solver.marching.march_result import MarchStatus
 from solver.scene.scene import Scene, load_scene
 
 DATA = Path(__file__).parent.parent.parent / "data"

@@ -16,7 +16,7 @@ from solver.matrices.readers.numbers_in_text import FormatError
 from solver.matrices.sectors.decks import read_deck
 from solver.matrices.sectors.elimination import elimination, phase_factor
 from solver.matrices.sectors.outline import KEYS, SectorOutline, outline_of
-from solver.matrices.sectors.reduction import read_sector
+from solver.matrices.sectors.sector_reduction import read_sector
 from solver.views.shapes import deflection_shape, mode_shape, shape_of_motion
 
 CUBE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]

@@ -27,7 +27,7 @@ from solver.matrices.sectors.decks import Deck, read_deck
 from solver.matrices.sectors.elimination import elimination, rotation
 from solver.matrices.sectors.loading import boundaries
 from solver.matrices.sectors.pairing import groups, paired
-from solver.matrices.sectors.reduction import diameters_met, reduce_sector
+from solver.matrices.sectors.sector_reduction import diameters_met, reduce_sector
 from stickslip.lab.worst_mistuning.linear_disk import Contacts, linear_disk, with_factors
 
 ROOT = Path(__file__).resolve().parents[3]

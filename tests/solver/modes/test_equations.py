@@ -9,7 +9,7 @@ import pytest
 import solver
 from solver.modes import sparse
 from solver.modes.corrector import scales
-from solver.modes.equations import Equations, step
+from solver.modes.mode_equations import Equations, step
 from solver.modes.nonlinear_mode import pose
 
 SCENES = [

@@ -9,8 +9,8 @@ import pytest
 
 import solver
 from solver.modes.corrector import ModeState, correct
+from solver.modes.mode_start import begin, phase_of
 from solver.modes.nonlinear_mode import pose
-from solver.modes.start import begin, phase_of
 from tests.cases.matrix_cases import chain_raw
 from tests.cases.random_scenes import random_scene
 

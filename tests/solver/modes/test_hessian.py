@@ -7,8 +7,8 @@ import pytest
 
 import solver
 from solver.modes.at_amplitudes import ModePoints, damping_hessian, mode_at_amplitudes
-from solver.modes.gradient import ModeSensitivities
-from solver.modes.hessian import mode_hessian
+from solver.modes.mode_gradient import ModeSensitivities
+from solver.modes.mode_hessian import mode_hessian
 from solver.modes.nonlinear_mode import pose
 from tests.cases.matrix_cases import chain_raw
 from tests.cases.mode_cases import one_mass, slider

@@ -9,7 +9,7 @@ import pytest
 
 import optim
 import solver
-from optim.results.design import Certainty
+from optim.results.design_result import Certainty
 from solver.response.band_end import BAND_END
 from solver.results.notes import Note
 from solver.scene.scene import Scene

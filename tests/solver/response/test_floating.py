@@ -27,7 +27,7 @@ from solver.continuation.branches.sweep import walk
 from solver.continuation.segment import joined
 from solver.continuation.stretches import balanced_part
 from solver.linear.condensation import loose_motions
-from solver.marching.result import MarchStatus
+from solver.marching.march_result import MarchStatus
 
 ENDED = (BranchStatus.COMPLETED, BranchStatus.RATCHETS)
 

@@ -29,8 +29,8 @@ from solver.contacts.pieces.piece import StatePiece, spring
 from solver.continuation.branches.sweep import walk
 from solver.jit.fourier import to_full
 from solver.linear.assembly import linear_model
-from solver.marching.equations import equations_of_motion
 from solver.marching.kernels import taylor as kernel
+from solver.marching.march_equations import equations_of_motion
 from solver.response.solution import Solution
 from solver.response.stability.floquet import scene_monodromy
 from solver.response.stability.monodromy import PERIOD, LinearPart, Monodromy, PeriodElement, monodromy

@@ -11,7 +11,7 @@ from history_scenes import history_scene
 from scene_cases import bladed_disk, oscillator, two_dof
 
 from solver import Effects, Scene, SettingError, Solution, load_scene, march, solve, sweep
-from solver.marching.result import MarchResult
+from solver.marching.march_result import MarchResult
 from solver.response.contact_response import ContactState
 from solver.response.stability.residual_forces import amplitude_range
 from solver.scene.scene import FrictionContact, Observe

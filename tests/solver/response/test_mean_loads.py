@@ -10,7 +10,7 @@ from hard_scenes import HARD
 from pulled_scenes import Pulled, pulled_bar, pulled_body, pulled_mass, pulled_wedge, wedge_limit
 
 from solver import BranchStatus, Scene, SolutionStatus, load_scene, march, solve, sweep
-from solver.marching.result import MarchStatus
+from solver.marching.march_result import MarchStatus
 
 ABOVE = "mean_load_above_friction"
 DRAWN = {"bar": pulled_bar, "mass": pulled_mass}

@@ -22,7 +22,7 @@ from solver import Scene, SettingError, SolutionStatus, march, solve
 from solver.balance.balance import build
 from solver.balance.workspace import Workspace
 from solver.continuation.extrema.error_estimate import truncation_error
-from solver.marching.result import MarchStatus
+from solver.marching.march_result import MarchStatus
 from solver.response.contact_response import ContactState
 
 ROWS = TWO_DOF_ROWS + DISK_ROWS

@@ -18,7 +18,7 @@ from every_module import every_module
 import optim
 import solver
 import stickslip.lab
-from service.jobs.common.results import result_model
+from service.jobs.common.result_models import result_model
 from solver.arrays import FloatOrNaN, Real
 from solver.results.told import Piece, Told, json_keys, json_value
 

@@ -14,7 +14,7 @@ import solver
 from solver import Scene, march, solve, sweep
 from solver.balance.balance import build, fewer_harmonics
 from solver.balance.more_harmonics import less_harmonics, more_harmonics, pad
-from solver.scene.harmonics import FAST, MOST_HARMONICS, forced_harmonics, kept_harmonics, spread
+from solver.scene.scene_harmonics import FAST, MOST_HARMONICS, forced_harmonics, kept_harmonics, spread
 
 DEFECTS = Path(__file__).parent.parent.parent / "data" / "defects"
 ASKED = (0, 1, 2, 3, 5, 11, 12, 24, 61)

@@ -15,7 +15,7 @@ from jsonschema import Draft202012Validator
 
 import solver
 from service.cli import main
-from service.cli.commands.scenes import Described, schema_of
+from service.cli.commands.scene_commands import Described, schema_of
 from solver.scene.toml import load_raw
 
 ROOT = Path(__file__).resolve().parent.parent.parent.parent

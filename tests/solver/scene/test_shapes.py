@@ -10,7 +10,7 @@ from cases.body_scenes import cylinder_in_space, planar_wedge, shaped_wedge
 
 from solver import Scene, SceneError, SettingError
 from solver.linear.assembly import linear_model, structure_derivative
-from solver.scene.bodies.shapes import SHAPES
+from solver.scene.bodies.body_shapes import SHAPES
 
 FACES: dict[str, dict[str, Any]] = {
     "wedge": {"angle": 0.5, "width": 0.01, "length": 0.004},

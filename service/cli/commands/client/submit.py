@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from optim.problem.keys import options as key_options_of
-from service.cli.commands.client.jobs import hand_in, scene_of
+from optim.problem.problem_keys import options as key_options_of
+from service.cli.commands.client.job_commands import hand_in, scene_of
 from service.cli.options import inputs, problem_inputs
 from service.cli.options import shared as options
 from service.cli.options.key_options import (
@@ -23,14 +23,14 @@ from service.cli.options.parameters import Command, keyed, keyword, with_paramet
 from service.cli.options.problem_inputs import FLAGS, ProblemFlags, takes_problem
 from service.cli.table import TOP, CommandEntry
 from service.errors import InputError
-from service.jobs.registry import ABOUT_THE_JOB, JobKind
+from service.jobs.kind_registry import ABOUT_THE_JOB, JobKind
 from service.settings.kinds import registry_here
 
 if TYPE_CHECKING:
     import inspect
 
     from service.client.client import Client
-    from service.jobs.common.problem import ProblemRequest
+    from service.jobs.common.problem_requests import ProblemRequest
 
 
 class SubmitGroup(TyperGroup):
@@ -84,7 +84,7 @@ def submission(kind: JobKind, local: Command | None) -> Command:
     kind : what is submitted.
     local : the command that computes the same here; its options are reused.
     """
-    from service.jobs.common.problem import ProblemRequest
+    from service.jobs.common.problem_requests import ProblemRequest
 
     made = key_options(kind, local)
     if issubclass(kind.request, ProblemRequest):

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from solver.contacts.kernels.circle.radau import NODES, SLOPES, STAGES
 from solver.jit.angles import cosines_and_sines
 from solver.jit.decorators import compiled
-from solver.jit.records import Records, Row, record
+from solver.jit.kernel_records import Records, Row, record
 from solver.jit.separate import apart
 
 Array: TypeAlias = NDArray[Any]  # of real or of complex numbers

@@ -29,7 +29,7 @@ from solver.contacts.kernels.circle.stick import leave_stick
 from solver.contacts.kernels.stick_slip_events import AFTER_SEPARATION, AFTER_SLIP, NO_LENGTH, SLIP, STICK
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
-from solver.jit.records import Records, record
+from solver.jit.kernel_records import Records, record
 from solver.jit.separate import apart
 
 

@@ -4,7 +4,7 @@ The classic alternating frequency/time scheme: motion and load are sampled at eq
 ``kt (u_j − u_{j−1})`` is cut back to the friction limit μ N_j (to 0 where N_j ≤ 0), periods are marched until
 the state repeats, and the samples are transformed back. Sticking since sample a the force is
 ``kt (u_j − u_a) + f_a`` with f_a = ξ μ N_a after slip and 0 after separation, so that the derivatives of the
-scheme itself are sums over its samples of the same form as those of `solver.contacts.kernels.coulomb.force`.
+scheme itself are sums over its samples of the same form as those of `line_force`.
 
 Cameron, Griffin, J. Appl. Mech. 56 (1989) 149, doi:10.1115/1.3176036; with a variable normal load: Yang, Chu,
 Menq, J. Sound Vib. 210 (1998) 461, doi:10.1006/jsvi.1997.1305.
@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from solver.contacts.kernels.coulomb.force import basis_at, moment_rows, products
+from solver.contacts.kernels.coulomb.line_force import basis_at, moment_rows, products
 from solver.contacts.kernels.stick_slip_events import (
     AFTER_SEPARATION,
     AFTER_SLIP,
@@ -31,8 +31,8 @@ from solver.contacts.kernels.stick_slip_events import (
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count
+from solver.jit.kernel_records import Records
 from solver.jit.lapack import dot, fill, fill_block
-from solver.jit.records import Records
 from solver.jit.separate import apart
 
 # What a contact does at a sample.
@@ -243,7 +243,7 @@ def sampled_force(
     Parameters
     ----------
     samples : instants in a period, a multiple of 4 and more than twice the highest harmonic.
-    others : as `solver.contacts.kernels.coulomb.force.contact_force`, which it stands in for.
+    others : as `solver.contacts.kernels.coulomb.line_force.contact_force`, which it stands in for.
 
     Returns
     -------

@@ -7,9 +7,9 @@ of the motion u + (c/kt) u', whose coefficients are (1 + ikω c/kt) times those 
 from __future__ import annotations
 
 from solver.contacts.kernels.columns import C_STICK, KT, OMEGA
-from solver.contacts.kernels.coulomb.law import coulomb_line
+from solver.contacts.kernels.coulomb.line_law import coulomb_line
 from solver.jit.fourier import Integer, Real, cosine_position
-from solver.jit.records import Records
+from solver.jit.kernel_records import Records
 from solver.jit.separate import apart
 
 

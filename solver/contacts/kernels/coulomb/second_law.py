@@ -1,6 +1,6 @@
 """Second derivatives of friction along lines under one load, which may move with the contact.
 
-Each direction is the closed form of `solver.contacts.kernels.coulomb.hessian`. Its force depends on X = kt U
+Each direction is the closed form of `line_hessian`. Its force depends on X = kt U
 and Y = μN alone: a change of kt is one of U by U dkt/kt, a change of μ one of N by N dμ/μ. A load that moves
 is N = load + kn v, with dN = dload + dkn v + kn dv, so that of ℓ = w·F
 
@@ -17,9 +17,9 @@ import math
 import numpy as np
 
 from solver.contacts.kernels.columns import KN, KT, KT_SECOND, MU
-from solver.contacts.kernels.coulomb.force import add_moments, bases_at, contact_force, products
-from solver.contacts.kernels.coulomb.hessian import second_along
-from solver.contacts.kernels.coulomb.law import contact_of, load_of, with_second
+from solver.contacts.kernels.coulomb.line_force import add_moments, bases_at, contact_force, products
+from solver.contacts.kernels.coulomb.line_hessian import second_along
+from solver.contacts.kernels.coulomb.line_law import contact_of, load_of, with_second
 from solver.contacts.kernels.stick_slip_events import (
     FAILED,
     LIFTING,
@@ -28,8 +28,8 @@ from solver.contacts.kernels.stick_slip_events import (
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count, merged, positions
+from solver.jit.kernel_records import Records
 from solver.jit.lapack import dot, fill, fill_block
-from solver.jit.records import Records
 from solver.jit.separate import apart
 
 
@@ -192,7 +192,7 @@ def box_second(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, cos_table: Real, sin_table: Real, w: Real,
     dU: Real, drow: Real, dload: Real, out_U: Real, out_row: Real, out_load: Real,
 ) -> int:  # fmt: skip
-    """Differentiate `solver.contacts.kernels.coulomb.law.coulomb_box` (as in the contract)."""
+    """Differentiate `solver.contacts.kernels.coulomb.line_law.coulomb_box` (as in the contract)."""
     given, moved = with_second(row, drow)
     state = _rubbing(
         U, ks, load, load_ks, given, cos_table, sin_table, w, dU, moved, dload, 2, KT_SECOND, out_U, out_row,

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.contacts.kernels.history.nodes import fill_velocity, motion_at
+from solver.contacts.kernels.history.history_nodes import fill_velocity, motion_at
 from solver.contacts.kernels.history.partials import BY_DIFFERENCES, inputs_of, partials
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Integer, Real

@@ -10,21 +10,21 @@ import numpy as np
 
 from solver.contacts.fields import LEAST_SAMPLES, Real, Samples
 from solver.contacts.kernels import columns
-from solver.contacts.laws.base import AnyContact, RateContact
+from solver.contacts.laws.contact_law import AnyContact, RateContact
+from solver.contacts.laws.contact_parts import Follows, RestStiffness, Row
 from solver.contacts.laws.history.definition import HistoryLaw
-from solver.contacts.laws.parts import Follows, RestStiffness, Row
 from solver.errors import SettingError
 
 NODES_A_HARMONIC, BETWEEN_REVERSALS = 32, 16
 _SMALL = 1e-9  # m; the motion whose force tells the stiffness at rest
-_FORM = {"steps": 1, "reversals": 2, "alone": 4}  # bits of `solver.contacts.kernels.history.law`
+_FORM = {"steps": 1, "reversals": 2, "alone": 4}  # bits of `solver.contacts.kernels.history.history_law`
 
 
 class HistoryContact(RateContact):
     """A law given by functions of the motion and its history."""
 
     DEFINITION: ClassVar[HistoryLaw]
-    KERNEL: ClassVar[str] = "solver.contacts.kernels.history.law:history_law"
+    KERNEL: ClassVar[str] = "solver.contacts.kernels.history.history_law:history_law"
     HELD: ClassVar[tuple[RestStiffness, ...]] = (RestStiffness(columns.KT),)
     WORDS: ClassVar[Mapping[str, str]] = {}
 
@@ -156,7 +156,7 @@ class HistoryContact(RateContact):
         SettingError
             The frequency is not known (`at_frequency`), or the law gives no finite force that repeats.
         """
-        from solver.contacts.kernels.history.law import history_forces
+        from solver.contacts.kernels.history.history_law import history_forces
         from solver.jit import fourier
 
         del load
@@ -185,7 +185,7 @@ class HistoryContact(RateContact):
 
 def _of_law(word: str) -> AnyContact:
     """A contact of a law, as yet without numbers."""
-    from solver.contacts.laws.registry import laws
+    from solver.contacts.laws.law_registry import laws
 
     law = laws()[word]
     return law.__new__(law)

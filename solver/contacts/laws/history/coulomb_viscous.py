@@ -17,10 +17,10 @@ import numpy as np
 
 from solver.contacts.fields import NonNegative, Real
 from solver.contacts.kernels import columns
-from solver.contacts.laws.base import AnyContact, RateContact
+from solver.contacts.laws.contact_law import AnyContact, RateContact
+from solver.contacts.laws.contact_parts import Follows, LawQuantity, Row
 from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.history.definition import HistoryLaw, LawParameter
-from solver.contacts.laws.parts import Follows, LawQuantity, Row
 from solver.errors import SettingError
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import Any
 
 from solver.contacts.fields import LARGEST, LEAST_SAMPLES, MOST_SAMPLES
 from solver.contacts.kernels.columns import MOST_OWN, OWN
-from solver.contacts.laws.parts import LawQuantity
+from solver.contacts.laws.contact_parts import LawQuantity
 from solver.errors import SettingError
 
 MOST_STATES = 200

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal, ParamSpec, TypeVar
 
 from pydantic import Field, create_model
 
-from solver.contacts.laws import registry
-from solver.contacts.laws.base import AnyContact
+from solver.contacts.laws import law_registry as registry
+from solver.contacts.laws.contact_law import AnyContact
 from solver.contacts.laws.history.contact import HistoryContact
 from solver.contacts.laws.history.definition import HistoryLaw, LawParameter
 

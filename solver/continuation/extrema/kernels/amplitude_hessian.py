@@ -8,7 +8,7 @@ g = da/dω = L_ω and da/dp = L_p, and its Hessian along (du/dω, 1, dτ/dω) th
 
 Every term is linear in the contact forces or in λ, so with z = Aᵀλ − ξ Bᵀ e(τ*) (a weight for each force
 coefficient, differentiated with A and B) L = λ·u + ξ e·x_linear − λ·ū + z·(F − shift u), and wᵀ∂²F comes from
-`solver.contacts.kernels.coulomb.hessian` for elastic Coulomb contacts, whose events are known already, and
+`line_hessian` for elastic Coulomb contacts, whose events are known already, and
 from `solver.contacts.kernels.laws` for the others. Sums over harmonics are real parts: harmonic k of a
 vector v has v̂ = v_c − i v_s.
 """

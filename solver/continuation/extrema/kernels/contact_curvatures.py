@@ -10,8 +10,8 @@ import numpy as np
 
 from solver.balance.kernels.slopes import springs_of
 from solver.contacts.kernels.columns import KT, MU
-from solver.contacts.kernels.coulomb.force import contact_force
-from solver.contacts.kernels.coulomb.hessian import second_along
+from solver.contacts.kernels.coulomb.line_force import contact_force
+from solver.contacts.kernels.coulomb.line_hessian import second_along
 from solver.contacts.kernels.laws import call_law, call_second
 from solver.contacts.kernels.stick_slip_events import FAILED, SEPARATED, STUCK, UNLOADED
 from solver.contacts.kernels.system import System

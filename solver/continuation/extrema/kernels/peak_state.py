@@ -18,7 +18,7 @@ from solver.contacts.kernels.system import (
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count
-from solver.jit.records import Records
+from solver.jit.kernel_records import Records
 from solver.jit.reference import referenced
 from solver.linear.kernels.receptance_derivatives import Jets, new_jets
 

@@ -10,7 +10,7 @@ import solver
 from solver.modes.corrector import correct
 from stickslip.lab.controlled.phase_resonance import Driven
 from solver.modes.nonlinear_mode import pose
-from solver.modes.start import begin
+from solver.modes.mode_start import begin
 from tests.cases.mode_cases import one_mass, slider
 
 LEVEL = "excitation.amplitude"

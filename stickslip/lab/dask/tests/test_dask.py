@@ -27,7 +27,7 @@ from service.errors import ConfigurationError
 from service.jobs import strict_json
 from service.jobs.kinds import SHIPPED
 from service.jobs.outputs import Silent
-from service.jobs.registry import Registry
+from service.jobs.kind_registry import Registry
 from service.jobs.strict_json import validated
 from service.queue.health import check
 from service.settings.settings import Settings, load_settings
@@ -411,6 +411,8 @@ def test_a_service_without_the_extra_says_what_is_missing(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
+    for module in ("dask_executor", "cluster"):  # loaded by the tests before
+        monkeypatch.delitem(sys.modules, f"stickslip.lab.dask.{module}", raising=False)
     settings = load_settings(
         database=f"sqlite:///{tmp_path}/jobs.db", executor="dask", dask_scheduler="tcp://127.0.0.1:1"
     )
@@ -484,7 +486,7 @@ def test_a_thousand_disks_on_two_workers(service: tuple[EmbeddedService, DaskClu
 
 
 def test_the_examples_of_the_page_are_well_formed() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "cluster.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[4] / "docs" / "cluster.md").read_text(encoding="utf-8")
     blocks = [
         textwrap.dedent(block) for block in re.findall(r"(?:^(?: {4}.*)?\n)+", page, flags=re.MULTILINE)
     ]

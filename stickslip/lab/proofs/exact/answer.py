@@ -13,7 +13,7 @@ from typing import Annotated
 import numpy as np
 
 from solver.errors import SettingError
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.jit.fourier import Real
 from solver.response.contact_response import ContactResponse, ContactState, flags_of
 from stickslip.lab.proofs.exact.orbit_at_point import orbit_beside

@@ -19,17 +19,17 @@ from solver.balance.parameter import Kind
 from solver.continuation.between import closing_in, least_between
 from solver.continuation.branch import BranchStatus
 from solver.continuation.branches.sweep import check_limit
-from solver.continuation.certificate import uncertain
+from solver.continuation.peak_certificate import uncertain
 from solver.continuation.extrema.extrema import band_limit
 from solver.continuation.parameter_scale import check_range
-from solver.continuation.peaks import Band, Edge, Peak
+from solver.continuation.peak import Band, Edge, Peak
 from solver.continuation.segment import Course
-from solver.continuation.settings import ContinuationSettings
+from solver.continuation.continuation_settings import ContinuationSettings
 from solver.continuation.walk import Curve, walk
 from solver.errors import SettingError
-from solver.jit.clock import clock
+from solver.jit.timer import clock
 from solver.response.contact_response import code_of
-from stickslip.lab.proofs.exact.branch import ExactBranch, Orbits, Point
+from stickslip.lab.proofs.exact.exact_branch import ExactBranch, Orbits, Point
 from stickslip.lab.proofs.exact.piecewise import FREE, STICK, MemberState, Piecewise
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
 from solver.results.watch import OnProgress, ShouldStop, shows_progress

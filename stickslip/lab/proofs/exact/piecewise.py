@@ -17,7 +17,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from solver.contacts.laws.parts import Follows, NormalLoad, Row
+from solver.contacts.laws.contact_parts import Follows, NormalLoad, Row
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Flags, Integer, Real
 from solver.linear.assembly import check_structure, linear_model

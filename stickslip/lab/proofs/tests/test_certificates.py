@@ -19,8 +19,8 @@ from certified_scenes import random_scene
 
 import stickslip
 from service.cli import main
-from service.jobs.studies.design import Design
-from service.jobs.studies.peaks import Peaks
+from service.jobs.studies.design_study import Design
+from service.jobs.studies.peaks_study import Peaks
 from service.jobs.study import Watch
 from stickslip.lab.proofs import checker
 

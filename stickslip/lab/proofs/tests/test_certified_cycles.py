@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import solver
-from service.jobs.studies.modes import Modes
+from service.jobs.studies.modes_study import Modes
 from service.jobs.study import Watch
 from stickslip.lab.proofs import checker
 from tests.cases.mode_cases import one_mass

@@ -12,7 +12,7 @@ from test_rigid import one_mass, pressed, random_scene, with_stops, without_stop
 
 import stickslip
 from solver.continuation.branch import Branch
-from stickslip.lab.proofs.exact.branch import ExactBranch
+from stickslip.lab.proofs.exact.exact_branch import ExactBranch
 from solver.results.known import Stable
 from solver.studies.peaks.track_peak import track_peak
 

@@ -8,7 +8,7 @@ import pytest
 
 from service.cli import main
 from service.jobs.outputs import Silent
-from service.jobs.studies.sweep import Sweep, sweep_result
+from service.jobs.studies.sweep_study import Sweep, sweep_result
 from solver.scene.scene import Scene
 from solver.scene.toml import toml_text
 

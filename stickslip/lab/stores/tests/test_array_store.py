@@ -11,7 +11,7 @@ from service.client.embedded import EmbeddedService
 from stickslip.lab.stores.array_store import OUTSIDE_BYTES, FsspecStore
 from service.db.repositories.integrity import check
 from service.errors import ConfigurationError, DatabaseError
-from service.jobs.figures import StoredArray
+from service.jobs.stored_figures import StoredArray
 from service.queue.core import Service
 from service.queue.retention import prune_database
 
@@ -56,7 +56,7 @@ def test_an_array_is_on_disk_before_its_row(tmp_path: Path, monkeypatch: pytest.
     """With the folders that name it; the system is asked, as a power cut cannot be had here."""
     synced: list[int] = []
     monkeypatch.setattr(
-        "stickslip.lab.stores.array_store.os.fsync", lambda opened: synced.append(os.fstat(opened).st_ino)
+        "service.db.upload_files.os.fsync", lambda opened: synced.append(os.fstat(opened).st_ino)
     )
     data = bytes(OUTSIDE_BYTES)
     FsspecStore(str(tmp_path / "arrays")).put("job", StoredArray(sha256="digest", data=data, size=len(data)))

@@ -7,14 +7,14 @@ import pytest
 import optim
 import solver
 from optim.methods.afterwards import looked_after
-from optim.results.design import DesignStatus
+from optim.results.design_result import DesignStatus
 from optim.views.tables import design as designs
 from optim.views.tables import studies
 from service.cli import main
-from service.rendering.report.responses import ReportLine
+from service.rendering.report.responses_report import ReportLine
 from service.rendering.report.sections import branch_table
 from service.rendering.text import print_told
-from solver.continuation.certificate import uncertain
+from solver.continuation.peak_certificate import uncertain
 from solver.results.notes import FLAGS, NONE_HIGHER, flag_words
 from solver.views.tables import responses, tracks
 

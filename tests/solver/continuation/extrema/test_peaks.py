@@ -16,8 +16,8 @@ from solver.balance.parameter import Kind
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Branch
 from solver.continuation.extrema.extrema import HALF_POWER, band_limit
-from solver.continuation.extrema.kernels.intervals import WORTH_POLISHING
-from solver.continuation.peaks import Peak
+from solver.continuation.extrema.kernels.interval_kernels import WORTH_POLISHING
+from solver.continuation.peak import Peak
 
 HARMONICS = 7
 SCENES = {

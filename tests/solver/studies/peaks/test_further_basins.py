@@ -12,7 +12,7 @@ from random_scenes import random_scene
 import optim
 import solver
 from solver.studies.peaks.minimise_peak import least_peak
-from solver.studies.peaks.results import LeastPeak, TrackStatus
+from solver.studies.peaks.track_results import LeastPeak, TrackStatus
 from solver.studies.peaks.tracker import Tracker
 
 DISK = ("bladed-disk", "shroud.N0", 20.0, 3000.0)

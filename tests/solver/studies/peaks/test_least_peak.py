@@ -13,8 +13,8 @@ from scene_cases import oscillator
 import solver
 from solver.errors import SettingError
 from solver.studies.peaks.minimise_peak import least_peak
-from solver.studies.peaks.results import LeastPeak, TrackStatus
 from solver.studies.peaks.track import sweep_within
+from solver.studies.peaks.track_results import LeastPeak, TrackStatus
 from solver.studies.peaks.work_limit import Allowance
 
 DESIGNS = [

@@ -13,8 +13,8 @@ import solver
 from solver.scene.scene import Scene
 from solver.studies.peaks import work_limit as allowance
 from solver.studies.peaks.minimise_peak import least_peak
-from solver.studies.peaks.results import ChosenBy, LeastPeak, TrackStatus
 from solver.studies.peaks.track_peak import track_peak
+from solver.studies.peaks.track_results import ChosenBy, LeastPeak, TrackStatus
 
 HARMONICS = 3
 LIGHTEST = 2e-3  # damping ratio

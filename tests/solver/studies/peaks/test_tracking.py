@@ -11,8 +11,8 @@ import optim
 import solver
 from solver.errors import SettingError
 from solver.studies.peaks.minimise_peak import least_peak
-from solver.studies.peaks.results import TrackStatus
 from solver.studies.peaks.track_peak import track_peak
+from solver.studies.peaks.track_results import TrackStatus
 
 
 @cache

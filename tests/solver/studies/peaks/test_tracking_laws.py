@@ -14,8 +14,8 @@ from optim.errors import DesignError
 from solver.errors import SettingError
 from solver.scene.scene import Scene
 from solver.studies.peaks.minimise_peak import least_peak
-from solver.studies.peaks.results import TrackStatus
 from solver.studies.peaks.track_peak import track_peak
+from solver.studies.peaks.track_results import TrackStatus
 
 PLAIN: dict[str, Any] = {"kt": 1.0, "mu": 0.3, "N0": 0.4}
 RANGES: dict[str, tuple[Scene, str, float, float]] = {

@@ -1,0 +1,102 @@
+"""`stickslip scenes` and `schema`: the scenes that come with the package; the JSON Schemas for editors."""
+
+from __future__ import annotations
+
+import json
+from enum import Enum
+from typing import Annotated, Any
+
+import typer
+
+from service.cli import completion
+from service.cli.options import shared as options
+from service.errors import InputError
+from service.rendering.text import print_json, print_table, say
+from solver.scene.json_schema import DIALECT, plain, scene_schema
+
+
+class Described(Enum):
+    """What there is a schema of; the value is the word users write."""
+
+    SCENE = "scene"
+    PROBLEM = "problem"
+    JOB = "job"
+
+
+def schema_of(what: Described) -> dict[str, Any]:
+    """The schema of one kind of file."""
+    if what is Described.SCENE:
+        return scene_schema()
+    return _problem() if what is Described.PROBLEM else _job()
+
+
+def _problem() -> dict[str, Any]:
+    """Of ``--problem FILE``: a design, with the key that only fronts have."""
+    from service.jobs.studies.design_study import Design
+    from service.jobs.studies.pareto_study import Pareto
+
+    found = plain(Design.model_json_schema())
+    front = plain(Pareto.model_json_schema())
+    found["$defs"] = {**front.get("$defs", {}), **found.get("$defs", {})}
+    found["properties"] = {**front["properties"], **found["properties"]}
+    # The scene may be the command's argument instead.
+    found["required"] = [key for key in found.get("required", []) if key != "scene"]
+    found["properties"]["scene"] = _scene_of_a_file(found["properties"]["scene"])
+    return {"$schema": DIALECT, "title": "stickslip design problem", **found}
+
+
+def _scene_of_a_file(scene: dict[str, Any]) -> dict[str, Any]:
+    """Beside names and objects, the name of a scene file."""
+    return {"anyOf": [{"type": "string"}, {"type": "object"}], "description": scene.get("description", "")}
+
+
+def _job() -> dict[str, Any]:
+    """Of the body of ``POST /v1/jobs``."""
+    from service.jobs.kinds.bodies import body_model
+    from service.settings.kinds import registry_here
+
+    kinds, definitions = [], {}
+    for kind in registry_here():
+        schema = plain(body_model(kind.name, kind.request).model_json_schema())
+        definitions.update(schema.pop("$defs", {}))
+        kinds.append({**schema, "title": kind.name})
+    return {"$schema": DIALECT, "title": "stickslip job", "oneOf": kinds, "$defs": definitions}
+
+
+def scenes(as_json: options.Json = False) -> None:
+    """List the shipped scenes."""
+    import solver
+
+    known = [solver.load_scene(name) for name in solver.shipped_scenes()]
+    if as_json:
+        print_json({"scenes": [scene.name for scene in known]})
+        return
+    rows = [
+        (
+            scene.name,
+            scene.structure.kind,
+            str(len(scene.dofs)),
+            ", ".join(contact.name for contact in scene.contacts),
+            scene.observe.dof,
+            f"{scene.observe.band[0]:g} to {scene.observe.band[1]:g} Hz",
+        )
+        for scene in known
+    ]
+    print_table("Shipped scenes", ("name", "kind", "DOFs", "contacts", "observed", "band"), rows)
+
+
+def schema(
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="[scene|problem|job]",
+            help="What the schema is of.",
+            autocompletion=completion.words("scene", "problem", "job"),
+        ),
+    ] = "scene",
+) -> None:
+    """Print the JSON Schema of scene files, design problems or jobs, for editors."""
+    words = [one.value for one in Described]
+    if what not in words:
+        raise InputError(f"`schema` takes {', '.join(words)}, got {what!r}")
+    say(json.dumps(schema_of(Described(what)), indent=2, ensure_ascii=False))
