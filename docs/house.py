@@ -284,9 +284,9 @@ def layers(root: Path) -> dict[str, list[str]]:
     contracts = settings["tool"]["importlinter"]["contracts"]
     return {
         package: [name for layer in contract["layers"] for name in re.split(r" *[:|] *", layer)]
-        for package in reversed(PACKAGES)
+        for package in (LAB, *reversed(PACKAGES))
         for contract in contracts
-        if contract.get("containers") == [package]
+        if contract.get("containers") == [package.replace("/", ".")]
     }
 
 
@@ -295,7 +295,8 @@ def drawn(root: Path) -> str:
     wide, high, x, y = 800, 26, 90, 10
     rows: list[str] = []
     for package, names in layers(root).items():
-        rows.append(f'<text x="10" y="{y + 18}" class="package">{package}</text>')
+        title = package.rpartition("/")[2]
+        rows.append(f'<text x="10" y="{y + 18}" class="package">{title}</text>')
         for name in names:
             folder = root / package / name
             source = folder / "__init__.py" if folder.is_dir() else folder.with_suffix(".py")

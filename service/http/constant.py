@@ -8,14 +8,13 @@ import hashlib
 import re
 import threading
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 
 from fastapi import Request, Response
 
 _LEAST_COMPRESSED = 1000
 _GZIP = re.compile(r"\bgzip\b(?!\s*;\s*q=0(?:\.0*)?\s*(?:,|$))")
-# One thread: they are made one after the other, however many ask for them meanwhile.
-_making = ThreadPoolExecutor(1, thread_name_prefix="stickslip constants")
+_making = threading.Lock()  # they are made one after the other, however many ask for them meanwhile
 
 
 def known_by(request: Request, tag: str) -> bool:
@@ -51,7 +50,10 @@ class Constant:
         """The body, the same compressed, and its tag without quotes, as soon as they are made."""
         with self._lock:
             if self._made is None:
-                self._made = _making.submit(self._whole)
+                self._made = Future()
+                # Of a pool's threads a process that ends waits for the last: a service that has just begun
+                # would end seconds later.
+                threading.Thread(target=self._fulfil, args=(self._made,), daemon=True).start()
             return self._made
 
     async def answer(self, request: Request, headers: Mapping[str, str] | None = None) -> Response:
@@ -67,6 +69,13 @@ class Constant:
         if known_by(request, kept["ETag"]):
             return Response(status_code=304, headers=kept)
         return Response(body, media_type=self._media_type, headers=kept)
+
+    def _fulfil(self, made: Future[tuple[bytes, bytes, str]]) -> None:
+        with _making:
+            try:
+                made.set_result(self._whole())
+            except BaseException as error:  # noqa: BLE001 - whoever asks is told
+                made.set_exception(error)
 
     def _whole(self) -> tuple[bytes, bytes, str]:
         body = self._make()
