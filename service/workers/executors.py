@@ -169,7 +169,9 @@ def executor_of(settings: Settings, registry: Registry) -> Executor:
             limits=limits,
         )
     try:
-        made: Executor = from_lab("dask.dask_executor:of_settings")(settings, registry, limits)
+        made: Executor = from_lab("dask.dask_executor:of_settings")(
+            settings, settings.dask_scheduler, registry, limits
+        )
     except ImportError as error:
         raise ConfigurationError(
             f"`executor` 'dask' needs the extra of that name: pip install 'stickslip[dask]' ({error})"

@@ -390,11 +390,12 @@ class DaskExecutor:
             self._later(self._end, work, Lost(reason))
 
 
-def of_settings(settings: Settings, registry: Registry, limits: ProcessLimits) -> DaskExecutor:
+def of_settings(
+    settings: Settings, scheduler: str, registry: Registry, limits: ProcessLimits
+) -> DaskExecutor:
     """Return the executor that settings with a scheduler ask for."""
-    assert settings.dask_scheduler is not None
     security = None
-    if settings.dask_scheduler.startswith("tls://"):
+    if scheduler.startswith("tls://"):
         security = Security(
             tls_ca_file=str(settings.dask_ca_file),
             tls_client_cert=str(settings.dask_cert_file),
@@ -403,7 +404,7 @@ def of_settings(settings: Settings, registry: Registry, limits: ProcessLimits) -
         )
     return DaskExecutor(
         registry,
-        settings.dask_scheduler,
+        scheduler,
         security=security,
         grace_seconds=settings.grace_seconds,
         pace=settings.pace,
