@@ -95,8 +95,7 @@ class Solution(Drawn):
     harmonics: Annotated[
         Real,
         "|mean| and the amplitude of each harmonic of the observed DOF [m], up to the highest one kept: "
-        "that is above `n_harmonics` where a force is, see `kept_harmonics`. Zero "
-        "if not kept. (H + 1,).",
+        "that is above `n_harmonics` where a force is. Zero if not kept. (H + 1,).",
     ]
     observed: Annotated[Real, "Its coefficients [m], (2H + 1,)."]
     contacts: Annotated[tuple[ContactResponse, ...], "One for each contact of the scene."]
