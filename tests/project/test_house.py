@@ -5,9 +5,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 MOST = {
-    "lines of solver and optim": 83_700, "modules of solver and optim": 465,
-    "lines of service and migrations": 32_340, "modules of service and migrations": 173,
-    "lines of the page": 10_100, "names of modules twice": 15, "longest chain of imports": 31,
+    "lines of solver and optim": 83_683, "modules of solver and optim": 465,
+    "lines of service and migrations": 32_341, "modules of service and migrations": 173,
+    "lines of the page": 10_088, "names of modules twice": 15, "longest chain of imports": 31,
     "deepest folder": 3, "modules in circles": 0,
 }  # fmt: skip
 """After the last change that took something away. A change that needs more takes it from somewhere else."""
