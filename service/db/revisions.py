@@ -154,7 +154,7 @@ def _refuse_unknown(url: str, revision: str | None) -> None:
     known = {script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions()}
     if revision is None or revision in known:
         return
-    if "0000" < revision < min(known):
+    if revision in (f"{number:04}" for number in range(1, 13)):
         raise WrongRevisionError(
             f"{database_name(url)} is at revision {revision}, which was never released: bring it to "
             f"{min(known)} with a version of its time, or use another database (`--database`)"

@@ -45,8 +45,8 @@ class Views:
 
     Parameters
     ----------
-    package : where ``tables``, ``summary``, ``to_dataset`` and ``plots.figures`` stand; a folder of the lab
-        has its functions in ``tables`` and ``pictures``, and names them alone.
+    package : where ``tables``, ``summary``, ``to_dataset`` and ``plots.figures`` stand, or a folder of the
+        lab, whose ``module:name`` is the whole place in it.
     told : ``module:name`` of a function in ``tables`` that puts in words what `to_json` gives, or the name of
         one of ``summary``.
     dataset : name of a function; ``described`` makes the data set that the class says.
@@ -66,16 +66,16 @@ class Views:
             "to_dataset": ("", "to_dataset:", self.dataset),
             "figure": ("plots.", "plots.figures:", self.figure),
         }[what]
-        if not self.package.startswith(LAB):
-            return f"{self.package}.{of_json if ':' in name else of_result}{name}"
-        of_json = {"told": "tables", "figure": "pictures"}.get(what, "")
-        return f"{self.package}.{of_json}:{name}" if of_json else f"solver.views.{of_result}{name}"
+        in_lab = self.package.startswith(LAB)
+        if ":" in name:
+            return f"{self.package}.{'' if in_lab else of_json}{name}"
+        return f"{'solver.views' if in_lab else self.package}.{of_result}{name}"
 
     def call(self, what: str, result: Any, *arguments: Any, **options: Any) -> Any:
         """Show a result: `what` is ``told``, ``to_dataset`` or ``figure``."""
-        place = self.place(what)
-        of_result = place.rpartition(".")[2].partition(":")[0] in ("summary", "to_dataset", "figures")
-        return on_demand(place)(result if of_result else result.to_json(), *arguments, **options)
+        named = {"told": self.told, "to_dataset": self.dataset, "figure": self.figure}[what]
+        given = result.to_json() if ":" in named else result
+        return on_demand(self.place(what))(given, *arguments, **options)
 
 
 def on_demand(place: str) -> Callable[..., Any]:

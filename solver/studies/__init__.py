@@ -1,1 +1,1 @@
-"""Studies of a scene: plan, response map, tracked peaks, mistuning, what accuracy costs."""
+"""Studies of a scene: plan, response map, tracked peaks, mistuning."""

@@ -26,4 +26,4 @@ def test_the_core_does_not_grow() -> None:
         "modules in circles": sum(map(len, found.circles("at once"))),
     }  # fmt: skip
     more = {what: value for what, value in measured.items() if value > MOST[what]}
-    assert more == {}, f"more than {({what: MOST[what] for what in more})}"
+    assert more == {}, f"more than {[MOST[what] for what in more]}"

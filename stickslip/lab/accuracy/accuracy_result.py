@@ -41,7 +41,7 @@ class AccuracyRow(Piece):
 class AccuracyStudy(Drawn):
     """Rows of `accuracy_study` with what they are measured against."""
 
-    VIEWS: ClassVar = Views("stickslip.lab.accuracy", "accuracy", "accuracy_figure")
+    VIEWS: ClassVar = Views("stickslip.lab.accuracy", "tables:accuracy", "pictures:accuracy_figure")
     DATA: ClassVar = Data(
         "accuracy", {"way=rows": "harmonics evaluator samples max_abs error milliseconds iterations"
          " residual pareto"}, "frequency_hz reference reference_harmonics reference_error",

@@ -59,7 +59,7 @@ class ModelEvidence(Piece):
 class ModelChoice(Drawn):
     """Models, the most probable first."""
 
-    VIEWS: ClassVar = Views("stickslip.lab.posterior", "told", "drawn")
+    VIEWS: ClassVar = Views("stickslip.lab.posterior", "tables:told", "pictures:drawn")
     DATA: ClassVar = Data(
         "model-choice", {"model=models": "model=name probability probability_error"
         " log_evidence=posterior.log_evidence log_evidence_error=posterior.log_evidence_error"},

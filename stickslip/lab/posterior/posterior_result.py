@@ -74,7 +74,7 @@ class Marginal(Piece):
 class Posterior(Drawn):
     """The posterior of unknowns."""
 
-    VIEWS: ClassVar = Views("stickslip.lab.posterior", "told", "drawn")
+    VIEWS: ClassVar = Views("stickslip.lab.posterior", "tables:told", "pictures:drawn")
     DATA: ClassVar = Data(
         "posterior", {"parameter=marginals": "parameter=name mean sd low high", "draw parameter": "samples"},
         "sampler", rows=("draw",),

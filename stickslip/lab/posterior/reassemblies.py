@@ -57,7 +57,7 @@ class ReassemblyStatus(Enum):
 class Population(Drawn):
     """A population of assemblies."""
 
-    VIEWS: ClassVar = Views("stickslip.lab.posterior", "told", "drawn")
+    VIEWS: ClassVar = Views("stickslip.lab.posterior", "tables:told", "pictures:drawn")
     DATA: ClassVar = Data(
         "population", {"parameter=middles": "parameter=name mean sd low high", "draw parameter": "samples"},
         rows=("draw",),

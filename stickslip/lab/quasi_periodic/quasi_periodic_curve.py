@@ -38,7 +38,9 @@ class TorusCurveStatus(Enum):
 class QuasiPeriodicCurve(Drawn):
     """Responses to two frequencies at n values of the first one."""
 
-    VIEWS: ClassVar = Views("stickslip.lab.quasi_periodic", "quasi_periodic", "torus_curve_figure")
+    VIEWS: ClassVar = Views(
+        "stickslip.lab.quasi_periodic", "tables:quasi_periodic", "pictures:torus_curve_figure"
+    )
     DATA: ClassVar = Data(
         "quasi-periodic-curve", {
             "frequency_hz": "frequency_hz max_abs half_peak_to_peak rms first_amplitude second_amplitude "

@@ -35,7 +35,7 @@ class QuasiPeriodicStatus(Enum):
 class QuasiPeriodic(Drawn):
     """The response to two frequencies f₁ and f₂ that are no multiples: its size, spectrum and section."""
 
-    VIEWS: ClassVar = Views("stickslip.lab.quasi_periodic", "quasi_periodic", "torus_figure")
+    VIEWS: ClassVar = Views("stickslip.lab.quasi_periodic", "tables:quasi_periodic", "pictures:torus_figure")
     DATA: ClassVar = Data(
         "quasi-periodic", {"line": "line_first line_second line_hz line_amplitude",
         "section": "section section_velocity"},

@@ -58,7 +58,7 @@ class _LifeLook:
 class LeastWornPeak(Shown):
     """The best value of a parameter for contacts that wear, and the k values that were looked at."""
 
-    VIEWS: ClassVar = Views("stickslip.lab.wear_life", "least_worn_peak")
+    VIEWS: ClassVar = Views("stickslip.lab.wear_life", "tables:least_worn_peak")
     DATA: ClassVar = Data(
         "least-worn-peak",
         {"look": "looked_at heights"},

@@ -38,7 +38,7 @@ class WearLifeStatus(Enum):
 class WearLife(MadeOfResponses, Drawn):
     """Depths, loads and response over T hours of n contacts that wear, with derivatives by m numbers."""
 
-    VIEWS: ClassVar = Views("stickslip.lab.wear_life", "wear_life", "wear_life_figure")
+    VIEWS: ClassVar = Views("stickslip.lab.wear_life", "tables:wear_life", "pictures:wear_life_figure")
     DATA: ClassVar = Data(
         "wear-life", {
             "hours": "hours amplitude frequency_hz used", "contact hours": "depths loads power",

@@ -74,7 +74,9 @@ class IntentionalPattern(Piece):
 class WorstMistuning(Drawn):
     """The mistuning within bounds that makes the highest peak of any blade largest."""
 
-    VIEWS: ClassVar = Views("stickslip.lab.worst_mistuning", "worst_mistuning", "worst_mistuning_figure")
+    VIEWS: ClassVar = Views(
+        "stickslip.lab.worst_mistuning", "tables:worst_mistuning", "pictures:worst_mistuning_figure"
+    )
     DATA: ClassVar = Data(
         "worst-mistuning", {"sector": "factor=worst.factors"},
         "within rms of contacts dof magnification=worst.magnification whitehead martel power_bound"
