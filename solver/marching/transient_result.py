@@ -37,7 +37,7 @@ class TransientStatus(Enum):
 class TransientResult(Drawn):
     """The largest amplitude of a run and its envelope over time, n windows of at least one turn each."""
 
-    VIEWS: ClassVar = Views("solver.views", "responses:transient", "transients:transient_figure")
+    VIEWS: ClassVar = Views("solver.views", "responses:transient", "motion:transient_figure")
     DATA: ClassVar = Data(
         "transient", {"time": "time frequency_hz high low", "rates": "rates rates_max_abs"},
         "max_abs at_hz at_seconds steps_per_period error_estimate", scene="scene",

@@ -34,7 +34,7 @@ class Transient(Study):
     RESULT = answered("solver.marching.transient_result:TransientResult", "TransientResult")
     TOLD = "solver.views.tables.responses:transient"
     SHOWS, COUNTED = "the largest amplitude of a run ([transients](transients.md))", "turns"
-    FIGURE, EMPTY = "solver.views.plots.transients:transient_figure", ("time", "nothing was run through")
+    FIGURE, EMPTY = "solver.views.plots.motion:transient_figure", ("time", "nothing was run through")
 
     begin_hz: Annotated[NotNegative | None, Flag("--from", "F")] = Field(
         default=None, description="Frequency at the beginning [Hz]; that of the scene's band."

@@ -10,8 +10,16 @@ import re
 
 import numpy as np
 
-from solver.matrices.decks.deck import Deck, DeckFile, Members, real
-from solver.matrices.decks.deck_coordinates import GLOBAL, CoordinateKind, CoordinateSystem, ansys_axes
+from solver.matrices.decks.deck import (
+    GLOBAL,
+    CoordinateKind,
+    CoordinateSystem,
+    Deck,
+    DeckFile,
+    Members,
+    ansys_axes,
+    real,
+)
 from solver.matrices.readers.numbers_in_text import FormatError
 
 # Commands, by the four letters that tell them, that make, move or turn nodes in ways that are not read.

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from solver.matrices.decks.deck_coordinates import CoordinateSystem, FloatArray
 from solver.matrices.readers.numbers_in_text import FormatError, fortran_real
 from solver.matrices.sectors.elements import ElementShape, Integer
 
@@ -131,3 +133,118 @@ def frames(deck: Deck, nodes: Sequence[int]) -> FloatArray:
                 "axis, where they have no direction: give it another system before the export"
             )
     return found
+
+
+FloatArray = NDArray[np.float64]
+Vector = Sequence[float] | NDArray[Any]
+_NONE = 1e-9  # share of a length that counts as none
+
+
+class CoordinateKind(Enum):
+    """How three numbers tell a place."""
+
+    RECTANGULAR = "rectangular"  # x, y, z
+    CYLINDRICAL = "cylindrical"  # r, θ from x [degrees], z
+    SPHERICAL = "spherical"  # r, θ from z [degrees], φ from x [degrees]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoordinateSystem:
+    """A coordinate system."""
+
+    kind: CoordinateKind
+    origin: Annotated[FloatArray, "In the global system, (3,)."]
+    axes: Annotated[FloatArray, "Directions of x, y and z as columns, orthonormal and right-handed, (3, 3)."]
+
+    def places(self, given: FloatArray) -> FloatArray:
+        """Places (n, 3) in the global system of the numbers (n, 3) that tell them in this one."""
+        local = given
+        if self.kind is CoordinateKind.CYLINDRICAL:
+            r, angle = given[:, 0], np.radians(given[:, 1])
+            local = np.stack([r * np.cos(angle), r * np.sin(angle), given[:, 2]], axis=1)
+        elif self.kind is CoordinateKind.SPHERICAL:
+            r, polar, angle = given[:, 0], np.radians(given[:, 1]), np.radians(given[:, 2])
+            across = r * np.sin(polar)
+            local = np.stack([across * np.cos(angle), across * np.sin(angle), r * np.cos(polar)], axis=1)
+        return np.asarray(self.origin + local @ self.axes.T)
+
+    def frames(self, places: FloatArray) -> FloatArray:
+        """The axes of nodes at global places (n, 3) as columns, (n, 3, 3); NaN where they are not known.
+
+        On the axis of a cylinder, and of a sphere, a radius has no direction.
+        """
+        if self.kind is CoordinateKind.RECTANGULAR:
+            return np.broadcast_to(self.axes, (len(places), 3, 3)).copy()
+        local = (places - self.origin) @ self.axes
+        across = np.hypot(local[:, 0], local[:, 1])
+        size = np.linalg.norm(local, axis=1) + float(np.linalg.norm(self.origin))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            c, s = np.where(across > _NONE * size, local[:, :2].T / across, np.nan)
+        zero, one = np.zeros_like(c), np.ones_like(c)
+        about = [-s, c, zero]
+        if self.kind is CoordinateKind.CYLINDRICAL:
+            columns = [[c, s, zero], about, [zero, zero, one]]
+        else:
+            radius = np.linalg.norm(local, axis=1)
+            sin, cos = across / np.maximum(radius, 1e-300), local[:, 2] / np.maximum(radius, 1e-300)
+            columns = [[sin * c, sin * s, cos], [cos * c, cos * s, -sin], about]
+        return np.asarray(self.axes @ np.array(columns).transpose(2, 1, 0))
+
+    def moved(self, turn: FloatArray, shift: FloatArray) -> CoordinateSystem:
+        """The system after a rotation (3, 3) of the whole space about the origin and then a shift (3,)."""
+        return CoordinateSystem(self.kind, turn @ self.origin + shift, turn @ self.axes)
+
+
+GLOBAL = CoordinateSystem(CoordinateKind.RECTANGULAR, np.zeros(3), np.eye(3))
+
+
+def axes_by(first: int, along: Vector, second: int, beside: Vector) -> FloatArray:
+    """Axes (3, 3) of which one lies along a vector, and another on the side of a second vector.
+
+    Parameters
+    ----------
+    first, second : which of the axes 0, 1, 2.
+    along : the direction of the first.
+    beside : a vector in the plane of both, on the positive side of the second.
+
+    Raises
+    ------
+    ValueError
+        The vectors are none, or parallel.
+    """
+    one, other = np.asarray(along, dtype=np.float64), np.asarray(beside, dtype=np.float64)
+    size = float(np.linalg.norm(one))
+    if not 0.0 < size < math.inf:
+        raise ValueError("two of its points are the same")
+    one = one / size
+    left = other - (other @ one) * one
+    if not float(np.linalg.norm(left)) > _NONE * float(np.linalg.norm(other)):
+        raise ValueError("its points lie on one line")
+    axes = np.zeros((3, 3))
+    axes[:, first], axes[:, second] = one, left / np.linalg.norm(left)
+    third = 3 - first - second
+    axes[:, third] = np.cross(axes[:, (third + 1) % 3], axes[:, (third + 2) % 3])
+    return axes
+
+
+def around(axis: Vector) -> FloatArray:
+    """Axes (3, 3) with z along a vector, x and y anywhere: of a cylinder whose angles nobody asks for."""
+    z = np.asarray(axis, dtype=np.float64)
+    return axes_by(2, z, 0, np.eye(3)[int(np.argmin(np.abs(z)))])
+
+
+def rotation(axis: Vector, angle: float) -> FloatArray:
+    """The rotation by an angle [rad] about an axis through the origin, (3, 3) (Rodrigues)."""
+    k = np.asarray(axis, dtype=np.float64)
+    k = k / np.linalg.norm(k)
+    cross = np.array([[0.0, -k[2], k[1]], [k[2], 0.0, -k[0]], [-k[1], k[0], 0.0]])
+    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross))
+
+
+def ansys_axes(xy: float, yz: float, zx: float) -> FloatArray:
+    """Axes (3, 3) turned by Ansys' angles [degrees]: about z, then about the new x, then about the new y."""
+    z, x, y = (
+        rotation(axis, math.radians(angle))
+        for axis, angle in (((0, 0, 1), xy), ((1, 0, 0), yz), ((0, 1, 0), zx))
+    )
+    return np.asarray(z @ x @ y)

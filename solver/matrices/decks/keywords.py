@@ -14,13 +14,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from solver.matrices.decks.deck import Deck, DeckFile, Members, real
-from solver.matrices.decks.deck_coordinates import (
+from solver.matrices.decks.deck import (
     GLOBAL,
     CoordinateKind,
     CoordinateSystem,
+    Deck,
+    DeckFile,
+    Members,
     around,
     axes_by,
+    real,
     rotation,
 )
 from solver.matrices.readers.numbers_in_text import FormatError

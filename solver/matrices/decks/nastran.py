@@ -12,13 +12,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from solver.matrices.decks.deck import Deck, DeckFile, real
-from solver.matrices.decks.deck_coordinates import (
+from solver.matrices.decks.deck import (
     GLOBAL,
     CoordinateKind,
     CoordinateSystem,
+    Deck,
+    DeckFile,
     FloatArray,
     axes_by,
+    real,
 )
 from solver.matrices.readers.numbers_in_text import FormatError
 

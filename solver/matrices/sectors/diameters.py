@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.errors import SettingError
-from solver.matrices.sectors.outline_motion import OutlineMotion
+from solver.matrices.sectors.outline import OutlineMotion
 from solver.matrices.sectors.sector_parts import PartsAcross
 from solver.matrices.values import MOST_DOFS, ByContent, Matrix, differs
 

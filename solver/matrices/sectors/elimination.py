@@ -20,7 +20,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.matrices.decks.deck_coordinates import rotation as rotation
+from solver.matrices.decks.deck import rotation as rotation
 
 FloatArray = NDArray[np.float64]
 Group = tuple[int, ...]  # rows of a vector's three components (-1: held), or the one row of a scalar

@@ -13,12 +13,10 @@ import numpy as np
 
 from solver.matrices.matrix_validation import DofTable
 from solver.matrices.readers.reader import MatrixFileError
-from solver.matrices.reduction.craig_bampton import Reduced, craig_bampton
-from solver.matrices.reduction.reduction_error import Quality
+from solver.matrices.reduction.craig_bampton import Quality, Reduced, craig_bampton
 from solver.matrices.sectors.diameters import DiameterMatrices
 from solver.matrices.sectors.elimination import Elimination, phase_factor
-from solver.matrices.sectors.outline import SectorOutline
-from solver.matrices.sectors.outline_motion import OutlineMotion
+from solver.matrices.sectors.outline import OutlineMotion, SectorOutline
 from solver.matrices.sectors.sector_parts import PartsAcross
 
 SUFFIX = ".npz"

@@ -16,8 +16,7 @@ from sector_files import SECTORS, sector_files
 import solver
 from service.cli import main
 from solver.errors import SceneError
-from solver.matrices.decks.deck import Deck, frames
-from solver.matrices.decks.deck_coordinates import GLOBAL, CoordinateKind, CoordinateSystem
+from solver.matrices.decks.deck import GLOBAL, CoordinateKind, CoordinateSystem, Deck, frames
 from solver.matrices.labels import Label
 from solver.matrices.load_set import MatrixSet
 from solver.matrices.node_frames import in_global
