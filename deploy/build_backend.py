@@ -53,7 +53,7 @@ def build_wheel(
 def _compiled() -> Path:
     """Compile the kernels for this kind of processor; return their archive, beside the sources."""
     sys.path.insert(0, str(_HERE))
-    from solver.jit import shipped
+    from solver.jit import folder as shipped
 
     kind = shipped.target()
     if kind is None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from solver.contacts.kernels.circle.circle_law import whole_path
 from solver.contacts.kernels.circle.circle_state import FOUND, SETTLES
-from solver.contacts.kernels.circle.radau import between
+from solver.contacts.kernels.circle.panels import between
 from solver.contacts.kernels.columns import COLUMNS, KT, KT_SECOND, MU
 from solver.contacts.kernels.stick_slip_events import FAILED, SEPARATED, SLIP
 from solver.contacts.segments import Shares

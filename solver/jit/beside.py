@@ -20,8 +20,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any
 
-from solver.jit.folder import folder
-from solver.jit.shipped import processor, take
+from solver.jit.folder import folder, processor, take
 
 try:
     import fcntl

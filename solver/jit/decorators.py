@@ -5,6 +5,11 @@ IEEE meaning, because a NaN residual is how a failed evaluation is noticed.
 
 A kernel marked with `compiled` becomes part of each kernel that calls it: right for short ones. Longer ones
 are marked with `apart`, of `solver.jit.separate`.
+
+In the plain way everything is `numba.njit`: the code of a kernel becomes part of each that calls it, nothing
+is kept on disk, and a process compiles for minutes. Interpreted, kernels are the Python that they are: a
+debugger, `print` and coverage see them, Numba is not needed; the same numbers to rounding, some hundred times
+slower.
 """
 
 from __future__ import annotations
@@ -16,12 +21,11 @@ from solver.jit.way import WAY, Way
 
 if WAY is not Way.INTERPRETED:
     import numba
-
-    from solver.jit import plain
 if WAY is Way.COMPILED:
     from solver.jit.cache import KernelCache
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+_FASTMATH = {"reassoc", "contract"}
 
 
 def compiled(function: _Function, *, linked: bool = True) -> _Function:
@@ -34,21 +38,21 @@ def compiled(function: _Function, *, linked: bool = True) -> _Function:
     """
     if WAY is Way.INTERPRETED:
         return function
-    if WAY is Way.PLAIN:
-        return plain.apart(function)
-    inner = function.__name__.startswith("_")
+    inner, kept_on_disk = function.__name__.startswith("_"), WAY is Way.COMPILED
     kernel: Any = numba.njit(
         nogil=True,
         error_model="numpy",
-        fastmath=plain.FASTMATH,
-        no_cpython_wrapper=inner,
-        no_cfunc_wrapper=True,
+        fastmath=_FASTMATH,
+        no_cpython_wrapper=inner and kept_on_disk,
+        no_cfunc_wrapper=kept_on_disk,
     )(function)
+    typed: _Function = kernel
+    if not kept_on_disk:
+        return typed
     kernel._cache = KernelCache(function, linked=linked)  # what `cache=True` does, with a cache of our own
     if inner:
         kernel._insert = lambda *_: None  # into what Python may call
         kernel._compile_for_args = _refuse
-    typed: _Function = kernel
     return typed
 
 

@@ -21,7 +21,7 @@ from numba.core import cgutils
 from numba.core.extending import lower_builtin, type_callable
 from numba.core.typing import signature
 
-from solver.jit.kernel_forms import Form, of_numba
+from solver.jit.kernel_contracts import Form, of_numba
 from solver.jit.slots import call_at, loaded, made_address, watching
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -85,7 +85,7 @@ def numbered(arguments: tuple[Form, ...], result: Form, known: tuple[str, ...] =
 
     Parameters
     ----------
-    arguments, result : types of the kernels, see `solver.jit.kernel_forms`.
+    arguments, result : types of the kernels, see `solver.jit.kernel_contracts`.
     known : kernels whose numbers, from 0 on, are the same in every process.
 
     The function takes the number and the arguments. A number nobody asked for is a RuntimeError.

@@ -23,7 +23,7 @@ from __future__ import annotations
 from typing import Any
 
 from solver.jit.fourier import Complex, Real
-from solver.jit.kernel_forms import COMPLEX, FLOAT
+from solver.jit.kernel_contracts import COMPLEX, FLOAT
 from solver.jit.separate import numbered
 
 _VECTOR, _TABLE, _WAVE = (FLOAT, 1), (FLOAT, 2), (COMPLEX, 1)

@@ -10,9 +10,8 @@ from solver.jit.way import WAY, Way
 if WAY is Way.COMPILED:
     from solver.jit.kernel_tables import numbered
     from solver.jit.slots import apart
-elif WAY is Way.PLAIN:
-    from solver.jit.plain import apart, numbered
 else:
-    from solver.jit.interpreted import apart, numbered
+    from solver.jit.decorators import compiled as apart
+    from solver.jit.kernel_contracts import numbered
 
 __all__ = ["apart", "numbered"]

@@ -14,8 +14,8 @@ class Way(StrEnum):
     """What stands behind a kernel."""
 
     COMPILED = "compiled"  # machine code, kept on disk
-    PLAIN = "plain"  # the same by what Numba documents alone, see `solver.jit.plain`
-    INTERPRETED = "interpreted"  # the Python that it is, see `solver.jit.interpreted`
+    PLAIN = "plain"  # the same by what Numba documents alone
+    INTERPRETED = "interpreted"  # the Python that it is
 
 
 def _settled() -> Way:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from solver.jit.shipped import target
+from solver.jit.folder import target
 
 ROOT = Path(__file__).parents[2]
 BUILD = "import build_backend, sys; print(build_backend.build_wheel(sys.argv[1]))"

@@ -15,9 +15,8 @@ import numpy as np
 from solver.balance.kernels.coordinates import on_springs
 from solver.balance.kernels.gauge import rebase
 from solver.balance.kernels.jacobian import factorise, step_back
-from solver.balance.kernels.residual import contact_values, evaluate
+from solver.balance.kernels.residual import contact_values, evaluate, largest_load, least_load
 from solver.contacts.kernels.columns import KT, MU
-from solver.contacts.kernels.normal_load import largest_load, least_load
 from solver.contacts.kernels.system import SIZE, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count, cosine_position

@@ -30,7 +30,7 @@ from solver.contacts.kernels.columns import KERNELS, SECOND_KERNELS
 from solver.contacts.kernels.stick_slip_events import SEGMENT
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real
-from solver.jit.kernel_forms import FLOAT, INTEGER
+from solver.jit.kernel_contracts import FLOAT, INTEGER
 from solver.jit.kernel_records import Records
 from solver.jit.separate import numbered
 

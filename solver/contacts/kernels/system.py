@@ -28,8 +28,7 @@ import numpy as np
 from solver.contacts.kernels.stick_slip_events import new_segments
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Index, Integer, Real, coefficient_count
-from solver.jit.kernel_records import Records
-from solver.jit.reference import referenced
+from solver.jit.kernel_records import Records, referenced
 
 # What λ is, where it is no column of the contact table.
 FREQUENCY, LEVEL, FORCE_PHASE, STRUCTURE = 0, 1, 2, 3

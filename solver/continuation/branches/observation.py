@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver.balance.balance import Balance, build
-from solver.balance.kernels.observers import measure_through_modes
-from solver.balance.kernels.output import measure
+from solver.balance.kernels.output import measure, measure_through_modes
 from solver.balance.kernels.residual import evaluate
 from solver.balance.rounding import resonates_undamped
 from solver.balance.workspace import Workspace

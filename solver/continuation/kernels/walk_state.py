@@ -10,8 +10,8 @@ from solver.balance.kernels.residual import least_size
 from solver.contacts.kernels.system import System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
+from solver.jit.kernel_records import referenced
 from solver.jit.lapack import copy_to, largest_entry
-from solver.jit.reference import referenced
 
 # How a stretch of continuation ended, and how the next point may be predicted.
 RUNNING, FINISHED, NO_START, STALLED, LEFT_RANGE = 0, 1, 2, 3, 4

@@ -3,12 +3,24 @@
 A that is asked for again where it was filled is not summed again. What forces at the contacts move is found
 through the modes, A_k F = X diag(1/d) Yᴴ F, where derivatives are not asked for: it takes ports × modes
 products where the entries of A_k take ports² × modes.
+
+The receptance of many ports is a product of matrices, A_k = X D_k(ω) Yᴴ. All is put into real products, which
+take half as long as complex ones, and a quarter where modes are real: of a real mode x, or of the poles s and
+s̄ of a real structure with x and x̄, the columns are
+
+  x t yᴴ = [Re x] [t yᴴ],   x t yᴴ + x̄ t' y'ᴴ = [Re x, Im x] [t yᴴ + t' y'ᴴ; i (t yᴴ − t' y'ᴴ)],
+
+and of any other [Re x, Im x] [t yᴴ; i t yᴴ], with t = 1/d or a derivative of it. The left factor does not
+depend on the frequency.
+
+The tracking of a peak, where ω moves whatever the parameter is, needs the derivatives by ω, ω², p and ωp.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,16 +35,108 @@ from solver.contacts.kernels.system import (
     System,
 )
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Complex, Real
+from solver.jit.fourier import Complex, Integer, Real
+from solver.jit.kernel_records import referenced
 from solver.jit.separate import apart
 from solver.linear.kernels.dynamic_stiffness import (
+    BY_BOTH,
     BY_OMEGA,
     BY_P,
+    ORDERS,
     VALUE,
     fill_from_matrices,
+    fill_second_terms,
     fill_terms,
 )
-from solver.linear.kernels.modal_products import basis_of_modes, fill_product
+
+# What a mode is: the second of a pair, of real motion, the first of a pair of conjugates, any other.
+SECOND, REAL, FIRST, ANY = 0, 1, 2, 3
+ROUNDING = 1e-13  # relative, of modes that are conjugates
+
+
+@compiled
+def _kind_of(system: System, s: int, m: int) -> int:
+    """Return what mode m is, if it is not the second of a pair."""
+    modes, duals, values = system.contact_modes[s], system.contact_duals[s], system.eigenvalues[s]
+    turned, size, off, dual_size, dual_off = 0.0, 0.0, 0.0, 0.0, 0.0
+    pair = m + 1 < values.size and values[m + 1] == values[m].conjugate()
+    for c in range(modes.shape[0]):
+        turned += abs(modes[c, m].imag)
+        if pair:
+            size += abs(modes[c, m])
+            off += abs(modes[c, m + 1] - modes[c, m].conjugate())
+            dual_size += abs(duals[c, m])
+            dual_off += abs(duals[c, m + 1] - duals[c, m].conjugate())
+    if turned == 0.0:
+        return REAL
+    return FIRST if pair and off <= ROUNDING * size and dual_off <= ROUNDING * dual_size else ANY
+
+
+@compiled
+def basis_of_modes(system: System, s: int, ports: Integer) -> tuple[Real, Complex, Integer]:
+    """Return the modes of structure s at some ports as real columns, what multiplies them, and their kinds.
+
+    Returns
+    -------
+    basis (K, r), one row for each column of X; duals (nm, r) yᴴ; kinds (nm,).
+    """
+    nm, r = system.eigenvalues.shape[1], ports.size
+    kinds, count, m = np.zeros(nm, np.int64), 0, 0
+    while m < nm:
+        kinds[m] = _kind_of(system, s, m)
+        count += 1 if kinds[m] == REAL else 2
+        m += 2 if kinds[m] == FIRST else 1
+    basis, duals, row = np.empty((count, r)), np.empty((nm, r), np.complex128), 0
+    for m in range(nm):
+        for c in range(r):
+            duals[m, c] = system.contact_duals[s, ports[c], m]
+        if kinds[m] == SECOND:
+            continue
+        for c in range(r):
+            x = system.contact_modes[s, ports[c], m]
+            basis[row, c] = x.real
+            if kinds[m] != REAL:
+                basis[row + 1, c] = x.imag
+        row += 1 if kinds[m] == REAL else 2
+    return basis, duals, kinds
+
+
+@apart
+def fill_product(
+    basis: Real, duals: Complex, kinds: Integer, terms: Real, orders: int, i: int, A: Complex
+) -> None:
+    """Fill A[order, i] (r, r) of harmonic number i for the first derivatives.
+
+    Parameters
+    ----------
+    terms : (≥ 2·orders, nm) real and imaginary part of 1/d_m, then of its derivatives.
+    """
+    nm, r = duals.shape
+    rows, row = np.empty((basis.shape[0], 2 * orders * r)), 0
+    for m in range(nm):
+        if kinds[m] == SECOND:
+            continue
+        for order in range(orders):
+            real, imag = 2 * order * r, (2 * order + 1) * r
+            last = m + 1 if kinds[m] == FIRST else m
+            t = complex(terms[2 * order, m], terms[2 * order + 1, m])
+            t_last = complex(terms[2 * order, last], terms[2 * order + 1, last])
+            for c in range(r):
+                z = t * duals[m, c]
+                total, turned = z, 1j * z
+                if kinds[m] == FIRST:
+                    other = t_last * duals[last, c]
+                    total, turned = z + other, 1j * (z - other)
+                rows[row, real + c], rows[row, imag + c] = total.real, total.imag
+                if kinds[m] != REAL:
+                    rows[row + 1, real + c], rows[row + 1, imag + c] = turned.real, turned.imag
+        row += 1 if kinds[m] == REAL else 2
+    product = np.dot(basis.T, rows)
+    for order in range(orders):
+        for a in range(r):
+            for b in range(r):
+                at = 2 * order * r + b
+                A[order, i, a, b] = complex(product[a, at], product[a, at + r])
 
 
 @compiled
@@ -383,3 +487,81 @@ def modal_responses(system: System, p: float, i: int, forces: Complex, motions: 
                 f += x.real * real[m] - x.imag * imag[m]
                 g += x.real * imag[m] + x.imag * real[m]
             motions[c] += complex(f, g)
+
+
+class Jets(NamedTuple):
+    """The condensed linear part and its derivatives; nk harmonics, nc relative motions."""
+
+    A: Complex  # (ORDERS, nk, nc, nc)
+    u_linear: Complex  # (ORDERS, nk, nc)
+    B: Complex  # (ORDERS, nk, nc)
+    x_linear: Complex  # (ORDERS, nk)
+
+
+_new: Callable[..., Jets] = referenced("Jets", __name__, Jets._fields)
+
+
+@compiled
+def new_jets(system: System) -> Jets:
+    """Return empty jets for `system`."""
+    nk, nc = system.ks.size, system.shift.size
+    return _new(
+        np.zeros((ORDERS, nk, nc, nc), np.complex128), np.zeros((ORDERS, nk, nc), np.complex128),
+        np.zeros((ORDERS, nk, nc), np.complex128), np.zeros((ORDERS, nk), np.complex128),
+    )  # fmt: skip
+
+
+@apart
+def fill_jets(system: System, omega: float, p: float, out: Jets) -> None:
+    """Fill `out` at the frequency `omega` [rad/s] and the parameter λ = p (which is not the frequency)."""
+    clear(out)
+    out.A[:] = 0.0
+    if system.form == DENSE:
+        orders = np.arange(ORDERS if system.kind == STRUCTURE else BY_P)
+        fill_from_matrices(system, omega, p, orders, out)
+    else:
+        _modal(system, omega, out)
+    nc = out.u_linear.shape[2]
+    for i in range(system.ks.size):
+        f, df = excitation(system, p, system.ks[i])
+        x = out.x_linear[:, i]
+        x[BY_BOTH] = f * x[BY_BOTH] + df * x[BY_OMEGA]
+        x[BY_P] = f * x[BY_P] + df * x[VALUE]
+        for order in range(BY_P):
+            x[order] *= f
+        for c in range(nc):
+            u = out.u_linear[:, i, c]
+            u[BY_BOTH] = f * u[BY_BOTH] + df * u[BY_OMEGA]
+            u[BY_P] = f * u[BY_P] + df * u[VALUE]
+            for order in range(BY_P):
+                u[order] *= f
+    measure_only(system, out)
+
+
+@compiled
+def _modal(system: System, omega: float, out: Jets) -> None:
+    """Sum the modes: Z⁻¹ = Σ x_m y_mᴴ/d_m; (1/d)' = −d'/d², (1/d)'' = 2d'²/d³ − d''/d²."""
+    nc, nm = out.u_linear.shape[2], system.eigenvalues.shape[1]
+    terms, ports = np.empty((2 * BY_P, nm)), np.arange(nc if nc > PAIRS_UP_TO else 0)
+    for s in range(system.eigenvalues.shape[0]):
+        basis, duals, kinds = basis_of_modes(system, s, ports)
+        for i in range(system.ks.size):
+            if system.which[i] != s:
+                continue
+            fill_terms(system, s, 0, nm, float(system.ks[i]), omega, 1.0, terms)
+            fill_second_terms(system, nm, float(system.ks[i]), terms)
+            for order in range(BY_P):
+                for m in range(nm):
+                    part = complex(terms[2 * order, m], terms[2 * order + 1, m])
+                    driven = part * system.modal_forces[i, m]
+                    seen = part * system.observe_modes[s, m]
+                    out.x_linear[order, i] += system.observe_modes[s, m] * driven
+                    for c in range(nc):
+                        out.u_linear[order, i, c] += system.contact_modes[s, c, m] * driven
+                        out.B[order, i, c] += seen * system.contact_duals[s, c, m]
+                        if nc <= PAIRS_UP_TO:
+                            phi = system.contact_modes[s, c, m] * part
+                            for other in range(nc):
+                                out.A[order, i, c, other] += phi * system.contact_duals[s, other, m]
+            if nc > PAIRS_UP_TO:
+                fill_product(basis, duals, kinds, terms, BY_P, i, out.A)

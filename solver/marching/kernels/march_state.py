@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.jit.decorators import compiled
-from solver.jit.reference import referenced
+from solver.jit.kernel_records import referenced
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]

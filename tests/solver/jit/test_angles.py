@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from solver.jit.angles import cosines_and_sines
+from solver.jit.trig_polynomial import cosines_and_sines
 
 
 @pytest.mark.parametrize("turns", [0.1, 1.0, 20.0])

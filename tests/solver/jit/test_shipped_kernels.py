@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from solver.jit import beside, shipped
+from solver.jit import beside
+from solver.jit import folder as shipped
 from solver.jit.folder import folder
 
 KIND = shipped.Target("some-level", "+a,+b", frozenset())

@@ -26,8 +26,7 @@ from solver.contacts.kernels.system import (
 from solver.continuation.extrema.error_estimate import truncation_error
 from solver.jit import eigen
 from solver.linear.assembly import linear_model
-from solver.linear.kernels.receptance import PAIRS_UP_TO, receptance
-from solver.linear.kernels.receptance_derivatives import fill_jets, new_jets
+from solver.linear.kernels.receptance import PAIRS_UP_TO, fill_jets, new_jets, receptance
 from solver.sensitivity.gradient import Sensitivities
 
 TWO_PI = 2.0 * math.pi

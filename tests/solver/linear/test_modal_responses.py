@@ -5,8 +5,7 @@ import pytest
 
 import solver
 from solver.balance.balance import build
-from solver.balance.kernels.observers import measure_through_modes
-from solver.balance.kernels.output import LOST, MEASURES, measure
+from solver.balance.kernels.output import LOST, MEASURES, measure, measure_through_modes
 from solver.balance.kernels.residual import evaluate, evaluate_forces, prepare_forces
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import MODES, POLES, evaluation_by_value, receptance_by_value

@@ -11,6 +11,10 @@ import numpy as np
 
 from solver.contacts.kernels.circle.panels import (
     LIMIT,
+    NODES,
+    SLOPES,
+    STAGES,
+    WEIGHTS,
     Array,
     Curves,
     Number,
@@ -19,13 +23,12 @@ from solver.contacts.kernels.circle.panels import (
     solve_columns,
     turning_by,
 )
-from solver.contacts.kernels.circle.radau import NODES, SLOPES, STAGES, WEIGHTS
 from solver.contacts.kernels.coulomb.line_force import bases_by
-from solver.jit.angles import cosines_and_sines
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer
 from solver.jit.kernel_records import Row
 from solver.jit.separate import apart
+from solver.jit.trig_polynomial import cosines_and_sines
 
 # Sums over sticks (1), and over slips weighted by cos θ and sin θ, of cos qτ and sin qτ.
 STUCK_COS, STUCK_SIN, ALONG_COS, ALONG_SIN, ACROSS_COS, ACROSS_SIN = 0, 1, 2, 3, 4, 5

@@ -19,6 +19,8 @@ from solver.contacts.kernels.circle.circle_state import CLOSES, FOUND, OPENS, SE
 from solver.contacts.kernels.circle.panels import (
     CARRIED_CURVES,
     PANEL_MATRIX,
+    SLOPES,
+    STAGES,
     Array,
     Number,
     PanelWork,
@@ -28,7 +30,6 @@ from solver.contacts.kernels.circle.panels import (
     turning,
 )
 from solver.contacts.kernels.circle.path import CARRIED_PANEL, CARRIED_PIECE
-from solver.contacts.kernels.circle.radau import SLOPES, STAGES
 from solver.contacts.kernels.columns import KN, KT, KT_SECOND, MU
 from solver.contacts.kernels.coulomb.line_law import load_of, with_second
 from solver.contacts.kernels.coulomb.second_law import through_load, tie_second

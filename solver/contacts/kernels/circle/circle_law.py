@@ -17,8 +17,7 @@ import math
 
 import numpy as np
 
-from solver.contacts.kernels.circle.circle_force import circle_force
-from solver.contacts.kernels.circle.circle_gradient import circle_gradient
+from solver.contacts.kernels.circle.circle_gradient import circle_force, circle_gradient
 from solver.contacts.kernels.circle.circle_state import CLOSES, FOUND, SETTLES, TURN, find_path, new_tables
 from solver.contacts.kernels.circle.panels import LIMIT, Array, Number, X, Y
 from solver.contacts.kernels.circle.path import TABLE_FULL

@@ -10,6 +10,10 @@ The arguments are those of `solver.contacts.kernels.laws`.
 
 Reference: Yang, Chu, Menq, J. Sound Vib. 210 (1998) 461, doi:10.1006/jsvi.1997.1305; multi-harmonic form
 Petrov, Ewins, J. Turbomach. 125 (2003) 364, doi:10.1115/1.1539868.
+
+Where a dashpot stands beside the spring, both behind one slider, a stuck force is kt u + c u' + constant, and
+nothing but the sum counts: it is the element without dashpot of the motion u + (c/kt) u', whose coefficients
+are (1 + ikω c/kt) times those of u.
 """
 
 from __future__ import annotations
@@ -20,12 +24,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.contacts.kernels.columns import KN, KT, KT_SECOND, MU, PRESTRESSED, SAMPLES
+from solver.contacts.kernels.columns import C_STICK, KN, KT, KT_SECOND, MU, OMEGA, PRESTRESSED, SAMPLES
 from solver.contacts.kernels.coulomb.aft import sampled_force
 from solver.contacts.kernels.coulomb.line_force import add_moments, contact_force, products
 from solver.contacts.kernels.stick_slip_events import FAILED, LIFTING, SEPARATED, piece_of
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Integer, Real, coefficient_count, merged, positions
+from solver.jit.fourier import Integer, Real, coefficient_count, cosine_position, merged, positions
 from solver.jit.kernel_records import Records
 from solver.jit.lapack import dot, fill, fill_block
 from solver.jit.separate import apart
@@ -210,3 +214,31 @@ def coulomb_sampled(
     )  # fmt: skip
     _along_parameter(slope[KT], slope[MU], dload, by_kt, by_mu, by_N, dF_dp[0])
     return state, piece_of(segments, count)
+
+
+@apart
+def damped_line(
+    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
+    cos_table: Real, sin_table: Real, segments: Records, F: Real, dF_dU: Real, dF_dp: Real,
+) -> tuple[int, int]:  # fmt: skip
+    """Fill the friction, and its derivatives by the motion, the parameters and the frequency."""
+    lead = row[OMEGA] * row[C_STICK] / row[KT]
+    d_lead = (slope[OMEGA] * row[C_STICK] + row[OMEGA] * slope[C_STICK] - lead * slope[KT]) / row[KT]
+    felt = U.copy()
+    for h in range(ks.size):
+        if ks[h] > 0:
+            i, k = cosine_position(ks, h), ks[h]
+            felt[0, i] += lead * k * U[0, i + 1]
+            felt[0, i + 1] -= lead * k * U[0, i]
+    found = coulomb_line(
+        felt, ks, load, load_ks, row, slope, dload, cos_table, sin_table, segments, F, dF_dU, dF_dp
+    )
+    for h in range(ks.size):
+        if ks[h] > 0:
+            i, k = cosine_position(ks, h), ks[h]
+            for a in range(U.shape[1]):
+                by_cosine, by_sine = dF_dU[0, a, i], dF_dU[0, a, i + 1]
+                dF_dp[0, a] += d_lead * k * (by_cosine * U[0, i + 1] - by_sine * U[0, i])
+                dF_dU[0, a, i] = by_cosine - lead * k * by_sine
+                dF_dU[0, a, i + 1] = by_sine + lead * k * by_cosine
+    return found

@@ -24,21 +24,19 @@ from solver.contacts.kernels.columns import (
     OMEGA,
     OWN,
 )
-from solver.contacts.kernels.history.history_nodes import (
-    even_nodes,
-    fill_basis,
-    most_nodes,
-    nodes_between,
-    reversals,
-)
 from solver.contacts.kernels.history.partials import inputs_of
 from solver.contacts.kernels.history.turns import (
     Course,
     carry,
+    even_nodes,
+    fill_basis,
     fill_motion,
     go_round,
     halves_of,
+    most_nodes,
+    nodes_between,
     ramp_of,
+    reversals,
 )
 from solver.contacts.kernels.stick_slip_events import FAILED
 from solver.jit.decorators import compiled

@@ -35,7 +35,7 @@ class ViscousContact(RateContact, FrictionContact):
 
     LAW: ClassVar[str] = "coulomb-viscous"
     FORCE: ClassVar[str] = "as `coulomb`, in stick `kt u + c u̇ + constant`"
-    KERNEL: ClassVar[str] = "solver.contacts.kernels.coulomb.damped_line:damped_line"
+    KERNEL: ClassVar[str] = "solver.contacts.kernels.coulomb.line_law:damped_line"
     PARAMETERS: ClassVar[Mapping[str, LawQuantity]] = {
         **FrictionContact.PARAMETERS,
         "c": LawQuantity(

@@ -21,7 +21,7 @@ from solver.contacts.kernels.history.partials import BY_COMPLEX_STEP, BY_DIFFERE
 from solver.contacts.laws.history.definition import Derivatives, HistoryLaw
 from solver.errors import SettingError
 from solver.jit.decorators import kept
-from solver.jit.kernel_forms import of_numba
+from solver.jit.kernel_contracts import of_numba
 from solver.jit.law_functions import FORMS, TABLES
 from solver.jit.way import WAY, Way
 

@@ -45,7 +45,7 @@ from solver.jit.fourier import Real, coefficient_count, cosine_position
 from solver.jit.lapack import copy_block, dot, fill, fill_block
 from solver.jit.separate import apart
 from solver.linear.kernels.dynamic_stiffness import BY_BOTH, BY_OMEGA, BY_OMEGA_TWICE, BY_P, VALUE
-from solver.linear.kernels.receptance_derivatives import fill_jets
+from solver.linear.kernels.receptance import fill_jets
 
 _TURNS = 12
 

@@ -18,9 +18,8 @@ from solver.contacts.kernels.system import (
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count
-from solver.jit.kernel_records import Records
-from solver.jit.reference import referenced
-from solver.linear.kernels.receptance_derivatives import Jets, new_jets
+from solver.jit.kernel_records import Records, referenced
+from solver.linear.kernels.receptance import Jets, new_jets
 
 # Entries of `Summit.numbers`.
 NORM, AMPLITUDE, G, DA_DP, CURVE, DG_DP, TAU, DTAU, SIGN, CORNER, DRIFT, RATE = range(12)
