@@ -12,10 +12,10 @@ from .continuation.extrema.error_estimate import (
     ErrorEstimate as ErrorEstimate,
     branch_errors as branch_errors,
 )
-from .continuation.marks import Bifurcations as Bifurcations, Mark as Mark, MarkKind as MarkKind
-from .continuation.peak import Band as Band, Peak as Peak
-from .continuation.segment import Course as Course, Stretch as Stretch, joined as joined
-from .continuation.continuation_settings import (
+from .continuation.branch import Bifurcations as Bifurcations, Mark as Mark, MarkKind as MarkKind
+from .continuation.branch import Band as Band, Peak as Peak
+from .continuation.stretches import Course as Course, Stretch as Stretch, joined as joined
+from .continuation.walk import (
     ContinuationSettings as ContinuationSettings,
     Predictor as Predictor,
 )
@@ -53,7 +53,7 @@ from .modes.mode_results import (
     NonlinearModeStatus as NonlinearModeStatus,
     PhaseResonance as PhaseResonance,
 )
-from .response.power_balance import PowerBalance as PowerBalance, power_balance as power_balance
+from .response.time_history import PowerBalance as PowerBalance, power_balance as power_balance
 from stickslip.lab.quasi_periodic.quasi_periodic import quasi_periodic as quasi_periodic
 from stickslip.lab.quasi_periodic.quasi_periodic_curve import (
     QuasiPeriodicCurve as QuasiPeriodicCurve,
@@ -74,7 +74,7 @@ from .response.stability.residual_forces import (
     AmplitudeRange as AmplitudeRange,
     amplitude_range as amplitude_range,
 )
-from .response.stability.switching import Switched as Switched, switch_branches as switch_branches
+from .response.stability.bifurcations import Switched as Switched, switch_branches as switch_branches
 from .response.stability.uniqueness import Uniqueness as Uniqueness, uniqueness as uniqueness
 from .response.sweep import sweep as sweep
 from .response.time_history import (

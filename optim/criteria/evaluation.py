@@ -17,8 +17,8 @@ from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.continuation.branch import Branch
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
-from solver.continuation.continuation_settings import ContinuationSettings
-from solver.continuation.segment import Course
+from solver.continuation.stretches import Course
+from solver.continuation.walk import ContinuationSettings
 from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene
 from solver.studies.peaks.seeds import fitted

@@ -12,7 +12,7 @@ from optim.criteria.key import PositiveNumber
 if TYPE_CHECKING:
     from optim.criteria.response_gradients import Sensitivity
     from optim.problem.variables import Real
-    from solver.continuation.peak import Peak
+    from solver.continuation.branch import Peak
 
 # Peaks below this share of the highest are not handed to the optimiser: within one step they cannot lead.
 COMPETES = 0.6

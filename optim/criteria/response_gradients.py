@@ -5,7 +5,7 @@ Peak: at a maximum over the frequency ∂a/∂ω = 0, so its derivative by a par
 contact changes its state at the top, the two smooth pieces that meet there give it
 (`solver.sensitivity.nonsmooth`). Band edge: a(ω_e, p) = limit, so dω_e/dp = (dlimit/dp − ∂a/∂p)/(∂a/∂ω). An
 interval that ends in a fold moves with it, whatever the limit does: the ratio of both derivatives at the fold
-(`solver.continuation.folds`). The second derivatives are those of `solver.sensitivity.hessian`.
+(`solver.continuation.bracketing`). The second derivatives are those of `solver.sensitivity.hessian`.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ import numpy as np
 
 from optim.problem.variables import Real
 from solver.balance.balance import Balance
+from solver.continuation.branch import Edge, Peak
 from solver.continuation.extrema.extrema import HALF_POWER
-from solver.continuation.peak import Edge, Peak
 from solver.errors import SettingError
 from solver.sensitivity.gradient import Sensitivities
 from solver.sensitivity.nonsmooth import peak_gradient

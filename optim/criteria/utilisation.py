@@ -18,7 +18,7 @@ from optim.criteria.peak_criterion import maxima
 from optim.criteria.stress import by_row, leading, of_row, seen_by
 
 if TYPE_CHECKING:
-    from solver.continuation.peak import Peak
+    from solver.continuation.branch import Peak
     from solver.scene.scene import Scene
     from solver.scene.scene_records import Recovered
 

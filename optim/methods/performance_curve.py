@@ -28,8 +28,7 @@ from optim.results.design_result import DesignResult, DesignStatus
 from solver.jit.timer import clock
 from solver.modes.peaks.peak_correction import corrected_peak
 from solver.modes.peaks.peak_gradient import CurvePeak, peak_at_excitation
-from solver.modes.peaks.performance import PerformanceCurve
-from solver.modes.peaks.performance_range import performance_over
+from solver.modes.peaks.performance import PerformanceCurve, performance_over
 from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.scene import Scene
 

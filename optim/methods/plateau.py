@@ -21,7 +21,7 @@ from optim.methods.kkt import KEPT
 from optim.problem.design_problem import Problem
 from optim.problem.variables import BoundedVariable, parameter_values
 from optim.results.design_result import DesignStatus
-from solver.continuation.between import least_between, level_up_to
+from solver.continuation.bracketing import least_between, level_up_to
 from solver.response.solve import solve
 from solver.results.watch import ShouldStop
 

@@ -226,7 +226,7 @@ class DesignResult(MadeOfResponses, Drawn):
         is no peak.
         """
         branches = () if self.evaluation is None else tuple(over_bands(self.evaluation).values())
-        if branches and all(map(on_demand("solver.response.band_end:is_band_end"), branches)):
+        if branches and all(map(on_demand("solver.response.plausibility:is_band_end"), branches)):
             return Certainty.BAND_END
         followed = self.method is Method.TRACKED and bool(self.basins) and self.basins[0].proven
         return Certainty.CLOSED if followed and self.status in _PROVEN else Certainty.SAMPLED

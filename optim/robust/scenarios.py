@@ -22,7 +22,7 @@ from optim.problem.words import Aim
 from optim.results.json import over_bands
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
-from solver.continuation.continuation_settings import ContinuationSettings
+from solver.continuation.walk import ContinuationSettings
 from solver.results.known import Known, worst_of
 from solver.studies.blades import blade_peaks, blade_rows
 

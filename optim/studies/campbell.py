@@ -18,10 +18,9 @@ from optim.problem.problem_numbers import number_pair
 from optim.studies.crossings import CampbellDiagram, CampbellStatus, Crossing, OrderResponse, Ranges
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
-from solver.continuation.branch import Branch, BranchStatus
+from solver.continuation.branch import Branch, BranchStatus, Peak
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.error_estimate import ErrorEstimator
-from solver.continuation.peak import Peak
 from solver.errors import Place
 from solver.jit.fourier import Real
 from solver.jit.timer import clock

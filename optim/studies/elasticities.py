@@ -27,10 +27,9 @@ from solver.balance.parameter import resolve
 from solver.balance.parameter_derivatives import reason_without
 from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.contacts.laws.load_harmonics import is_phase
-from solver.continuation.branch import Branch, BranchStatus
+from solver.continuation.branch import Branch, BranchStatus, Peak
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.extrema import HALF_POWER
-from solver.continuation.peak import Peak
 from solver.jit.timer import clock
 from solver.scene.parameter_paths import PHASE
 from solver.scene.scene import Scene

@@ -16,8 +16,7 @@ from solver.results.views import Views
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from solver.continuation.branch import Branch
-    from solver.continuation.peak import Peak
+    from solver.continuation.branch import Branch, Peak
 
 
 class SensitivityStatus(Enum):

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.arrays import FloatOrNaN, Integer, Real
-from solver.continuation.peak import Band, Peak
-from solver.continuation.peak_certificate import PeakCertificate
 from solver.results.base import Drawn
 from solver.results.known import Known, Stable, Verdict
 from solver.results.notes import NOTHING_DAMPS, Note
+from solver.results.told import Piece
 from solver.results.views import Views, on_demand
 from solver.scene.scene import Scene
 
@@ -26,7 +26,161 @@ if TYPE_CHECKING:
 
     from solver.balance.balance import Balance
     from solver.balance.parameter import Parameter
-    from solver.continuation.marks import Bifurcations
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Peak(Piece):
+    """A local maximum of the amplitude along a branch, polished to the stationary point."""
+
+    JSON: ClassVar = "value at"
+
+    value: Annotated[float, "max|x| of the observed DOF [m]."]
+    at: Annotated[float, "Parameter value there, in user units (Hz for a frequency)."]
+    solution: Annotated[Real, "Slip motions of the contacts there [m], (n_unknowns,)."]
+    interior: Annotated[bool, "A true maximum, not an end of the branch."]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Edge(Piece):
+    """An end of an interval in which the amplitude exceeds a limit: where it equals the limit, or a fold."""
+
+    at: Annotated[float, "Parameter value, in user units."]
+    solution: Annotated[Real, "Slip motions of the contacts there [m], (n_unknowns,)."]
+    opens: Annotated[bool, "The interval begins here; otherwise it ends here."]
+    fold: Annotated[bool, "The branch turns back here, above the limit."] = False
+    corner: Annotated[bool, "It does so where a contact changes its state: the end has no derivative."] = (
+        False
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Band(Piece):
+    """Where the amplitude exceeds a limit."""
+
+    limit: Annotated[float, "The limit [m]."]
+    width: Annotated[float, "Measure of {parameter : amplitude > limit}, in user units (Hz for a frequency)."]
+    intervals: Annotated[tuple[tuple[float, float], ...], "Its intervals, ascending."]
+    edges: Annotated[
+        tuple[Edge, ...], "The interval ends inside the branch (an end of the range itself is not one)."
+    ]
+    known: Annotated[
+        bool,
+        "Wherever the amplitude may cross the limit between two points, that was settled by solutions; see "
+        "also `Branch.peak_certificate`.",
+    ] = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class PeakCertificate(Piece):
+    """What is known of the amplitude between the points of a branch.
+
+    It is about the branch as it was computed, with its harmonics: what the harmonics left out may change is
+    the error estimate, and another branch of a law that allows several is not on this one.
+    """
+
+    known: Annotated[
+        bool,
+        "No peak of the branch is higher than `bound`, and every peak above 1 % of the highest is listed.",
+    ]
+    reason: Annotated[str, "Why, or why it is not known."]
+    bound: Annotated[
+        float,
+        "What the amplitude does not exceed between points [m]: of the cubics through them, which near the "
+        "top are checked by their neighbours or by solutions between, and of the motion predicted at every "
+        "resonance of the structure with its contacts that is narrower than the points are apart. NaN if "
+        "not known.",
+    ]
+    widest_gap: Annotated[
+        float, "Largest distance between neighbouring points, in units of the parameter (Hz for a frequency)."
+    ]
+    resonances: Annotated[int, "Narrow resonances between points that were solved for."]
+
+
+def certified(*, bound: float, gap: float, resonances: int) -> PeakCertificate:
+    """Return the certificate of a branch on which everything was settled."""
+    solved = "" if resonances == 0 else f" {resonances} of them between points were solved for."
+    reason = (
+        "Every resonance of the structure with its contacts is as broad as the points are apart, or too "
+        f"weakly driven to matter, or solved for.{solved}"
+    )
+    return PeakCertificate(known=True, reason=reason, bound=bound, widest_gap=gap, resonances=resonances)
+
+
+def uncertain(why: str, gap: float = math.nan) -> PeakCertificate:
+    """Return the certificate of a branch of which something is not known."""
+    return PeakCertificate(
+        known=False, reason=f"Not known: {why}.", bound=math.nan, widest_gap=gap, resonances=0
+    )
+
+
+def unsettled(certificates: Iterable[PeakCertificate]) -> list[str]:
+    """Return why it is not known of some branches that no peak hides between points, each reason once."""
+    return list(dict.fromkeys(one.reason for one in certificates if not one.known))
+
+
+class MarkKind(Enum):
+    """What happens at a mark; the value is what a user reads."""
+
+    FOLD = "fold: the branch turns back in its parameter"
+    BRANCH_POINT = "branch point: another branch leaves this one"
+    PERIOD_DOUBLING = "period doubling: a motion of twice the period leaves this branch"
+    TORUS = "torus: a second frequency grows (Neimark-Sacker)"
+    END = "end: the branch goes no further"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Mark(Piece):
+    """A place on a branch."""
+
+    kind: Annotated[MarkKind, "What happens there."]
+    at: Annotated[float, "Parameter value, in user units."]
+    amplitude: Annotated[float, "max|x| of the observed DOF there [m]."]
+    solution: Annotated[Real, "Slip motions [m] with λ (inside unit) last, (n_unknowns + 1,)."]
+    after: Annotated[int, "The point of the branch it comes behind."]
+    corner: Annotated[bool, "Of a fold: a contact changes its state there."] = False
+    why: Annotated[str, "Of an end: how the branch ended."] = ""
+
+    def to_json(self) -> dict[str, object]:
+        """Return the mark as one JSON object."""
+        found: dict[str, object] = {
+            "kind": self.kind.name.lower(), "at": self.at, "amplitude": self.amplitude, "after": self.after,
+        }  # fmt: skip
+        if self.kind is MarkKind.FOLD:
+            found["corner"] = self.corner
+        return {**found, "why": self.why} if self.why else found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Bifurcations(Piece):
+    """Stability along a branch, and its marks."""
+
+    JSON: ClassVar = "known_by parameter_path=parameter unstable=stretches marks seconds"
+
+    unstable: Annotated[
+        NDArray[np.bool_], "Points at which a perturbation grows, as far as `known_by` sees, (P,)."
+    ]
+    marks: Annotated[tuple[Mark, ...], "In their order along the branch."]
+    known_by: Annotated[
+        str,
+        "``uniqueness``: loads are given and everything takes out power, so that all points are stable; "
+        "``determinant``: real perturbations of the same period alone are seen; ``multipliers``: all are.",
+    ]
+    parameter: Annotated[str, "Path of the parameter."]
+    seconds: Annotated[float, "What it took."]
+
+    @property
+    def stretches(self) -> tuple[tuple[int, int], ...]:
+        """First and last point of every stretch that is not stable."""
+        changes = np.flatnonzero(np.diff(np.concatenate([[0], self.unstable.astype(int), [0]])))
+        return tuple((int(first), int(last) - 1) for first, last in changes.reshape(-1, 2))
+
+    def of_a_branch(self) -> dict[str, object]:
+        """Return what the JSON object of a branch has of it."""
+        return {
+            "unstable": [list(stretch) for stretch in self.stretches],
+            "marks": [mark.to_json() for mark in self.marks],
+            "stability_known_by": self.known_by,
+        }
 
 
 class BranchStatus(Enum):
@@ -183,7 +337,7 @@ class AnyBranch(Drawn):
     def notes(self) -> tuple[Note, ...]:
         """A highest amplitude at an end of the band, and what of the scene is hardly meant."""
         of_scene = on_demand("solver.response.plausibility:plausibility")(self.scene)
-        return (*on_demand("solver.response.band_end:of_branch")(self), *of_scene)
+        return (*on_demand("solver.response.plausibility:band_end_of")(self), *of_scene)
 
     @property
     @abstractmethod
@@ -356,7 +510,7 @@ class Branch(AnyBranch):
     @property
     def known(self) -> Known:
         """By the error estimate and the flags of the highest peak."""
-        found: Known = on_demand("solver.response.known_of_response:known_of")(self)
+        found: Known = on_demand("solver.response.solve:known_of")(self)
         return found
 
     @property

@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from solver.continuation.between import closing_in
+from solver.continuation.bracketing import closing_in
 from solver.jit.fourier import Real
 from solver.modes.corrector import Corrected, ModeState, carried_as, correct
 from solver.modes.mode_curve import BENT, border_of, by_shape, is_near, tangent_of

@@ -12,8 +12,7 @@ import numpy as np
 from solver.jit.fourier import Integer, Real
 from solver.modes.corrector import Corrected, ModeState, correct
 from solver.modes.mode_curve import LEAST_SHARE, follow, share_of_first
-from solver.modes.mode_gradient import ModeSensitivities
-from solver.modes.mode_hessian import mode_hessian
+from solver.modes.mode_gradient import ModeSensitivities, mode_hessian
 from solver.modes.mode_start import begin, phase_of
 from solver.modes.nonlinear_mode import MOST_POINTS, ModeProblem, pose
 from solver.scene.scene import Scene
@@ -83,7 +82,7 @@ def damping_hessian(
     """Return the second derivatives of the damping ratio by paths at a point of a mode, (n_paths, n_paths).
 
     `guess` is that point, of `mode_at_amplitudes`; the others as there. Raises SettingError as
-    `solver.modes.mode_hessian.mode_hessian`.
+    `solver.modes.mode_gradient.mode_hessian`.
     """
     problem = pose(scene, mode, None, harmonics, paths=paths)
     sensitivities = ModeSensitivities(problem.equations, paths, turns=problem.turns)

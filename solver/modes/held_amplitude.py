@@ -22,7 +22,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver.balance.balance import Balance
-from solver.continuation.between import least_between
+from solver.continuation.bracketing import least_between
 from solver.jit.fourier import Complex, Real, cosine_position
 from solver.modes.corrector import Corrected, ModeState, correct
 from solver.modes.mode_equations import Evaluated, Forced

@@ -53,7 +53,7 @@ def of_solution(solution: Solution) -> float:
 
 def of_branch(branch: Branch) -> float:
     """Return the drift per period where a branch ended as ratcheting [m], a little beyond its last point."""
-    from solver.continuation.endings import AHEAD
+    from solver.continuation.stretches import AHEAD
 
     balance = branch.balance
     inside = balance.parameter.inside

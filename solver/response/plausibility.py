@@ -2,6 +2,10 @@
 
 All is judged by the linear structure. Of one with more than `natural_frequencies.LARGE` coordinates only what
 needs no modes is looked at.
+
+Every study that names a peak asks here whether it is a maximum or stands at an end of its band. At an end of
+the band the response still rises outwards: its height says where the band was cut, not how high a resonance
+is.
 """
 
 from __future__ import annotations
@@ -10,11 +14,12 @@ import math
 from collections.abc import Iterator
 from functools import lru_cache
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.balance.parameter import Kind
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
 from solver.linear.modal import SINGULAR
@@ -23,9 +28,13 @@ from solver.linear.natural_frequencies import LARGE, Resonances, resonances
 from solver.matrices.normal_modes import hermitian, least_stiffness, undamped_modes
 from solver.results import units
 from solver.results.notes import Note
+from solver.results.units import number
 from solver.scene.cyclic.annulus import written_out
 from solver.scene.scene import Scene
 from solver.wording import listing
+
+if TYPE_CHECKING:
+    from solver.continuation.branch import AnyBranch
 
 FAR = 5.0  # times from the band to the nearest natural frequency: Hz are 2 pi rad/s, N/mm 1000 N/m
 ROUGH = 1.5  # friction coefficient above what dry contacts have
@@ -33,6 +42,10 @@ OVERDAMPED, UNDAMPED = 0.5, 1e-9  # damping ratios: hardly a resonance above, ro
 STIFF = 1e4  # times the structure's stiffness at a contact: no longer told from rigid
 SOUND = 5000.0  # speed of sound in a bar of metal [m/s]
 _DRIVEN = 1e-9  # share of the largest static response from which a mode is driven and observed
+
+BAND_END = "band_end"
+_SAME = 1e-9  # relative distance from an end within which a frequency is that end
+_DIGITS = 6
 
 
 def plausibility(scene: Scene) -> tuple[Note, ...]:
@@ -190,3 +203,67 @@ class _Structure(NamedTuple):
                 "its stiffness in N/m?"
             )
             yield Note(name="stiff_contact", words=words, numbers=above)
+
+
+def is_band_end(branch: AnyBranch) -> bool:
+    """Whether the highest amplitude over a frequency is at an end of the range, and no maximum."""
+    peak = branch.peak
+    if peak is None or peak.interior or branch.posed.parameter.kind is not Kind.FREQUENCY:
+        return False
+    return _at_end(peak.at, (branch.start, branch.stop))
+
+
+def band_end_of(branch: AnyBranch) -> tuple[Note, ...]:
+    """Return the note of a branch whose highest amplitude is at an end of its band; else none."""
+    if branch.peak is None or not is_band_end(branch):
+        return ()
+    return band_end_at(branch.scene, branch.peak.at, (branch.start, branch.stop))
+
+
+def band_end_at(scene: Scene, at_hz: float, band: tuple[float, float]) -> tuple[Note, ...]:
+    """Return the note of a highest amplitude of which no more is known than its place; none inside the band.
+
+    Parameters
+    ----------
+    scene : what vibrates.
+    at_hz : where the highest amplitude over the band is [Hz].
+    band : ends of the band looked at [Hz].
+    """
+    if not _at_end(at_hz, band):
+        return ()
+    low, high = sorted(band)
+    numbers = {"at_hz": at_hz}
+    found = resonances(scene)
+    if found is not None:
+        for name, each in (("open_hz", found.open_hz), ("stuck_hz", found.stuck_hz)):
+            outside = each[(each < low) | (each > high)]
+            if outside.size:
+                numbers[name] = nearest(outside, low, high)
+    words = (
+        f"the highest amplitude is at an end of the band, {number(at_hz, _DIGITS)} Hz, and no maximum"
+        f"{_outside(numbers) if found is not None else ''}"
+    )
+    return (Note(name=BAND_END, words=words, numbers=numbers),)
+
+
+def nearest(frequencies: Real, low: float, high: float) -> float:
+    """Return which of some frequencies is nearest to a band, in Hz."""
+    return float(min(frequencies.tolist(), key=lambda each: max(low - each, each - high)))
+
+
+def _at_end(at_hz: float, band: tuple[float, float]) -> bool:
+    return any(abs(at_hz - end) <= _SAME * abs(end) for end in band)
+
+
+def _outside(numbers: dict[str, float]) -> str:
+    """Where the nearest linear resonances are."""
+    told = [
+        f"{number(numbers[name], _DIGITS)} Hz with all contacts {words}"
+        for name, words in (("open_hz", "open"), ("stuck_hz", "stuck"))
+        if name in numbers
+    ]
+    if not told:
+        return "; no linear resonance lies outside it"
+    if numbers.get("open_hz") == numbers.get("stuck_hz"):
+        told = [f"{number(numbers['open_hz'], _DIGITS)} Hz"]
+    return f"; the nearest linear resonance outside it is {' or '.join(told)}"

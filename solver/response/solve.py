@@ -17,9 +17,10 @@ from solver.balance.simplifications import Effects
 from solver.balance.workspace import PointSolution, Workspace
 from solver.contacts.kernels.stick_slip_events import STUCK
 from solver.contacts.kernels.system import UNHELD, evaluation_by_value
+from solver.continuation.branch import Branch, unsettled
 from solver.continuation.branches.adaptive_harmonics import solve_to
 from solver.continuation.branches.symmetry_breaking import assumed_flags, seen
-from solver.continuation.extrema.error_estimate import UNKNOWN, truncation_error
+from solver.continuation.extrema.error_estimate import UNKNOWN, ErrorEstimator, truncation_error
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.jit import fourier
 from solver.jit.fourier import Real
@@ -29,7 +30,10 @@ from solver.linear.condensation import loose_ports
 from solver.linear.modal import undamped_resonance
 from solver.response.contact_response import contact_responses, flags_of
 from solver.response.history_dependence import has_another_solution, history_of
-from solver.response.solution import Solution, SolutionStatus
+from solver.response.plausibility import band_end_of
+from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
+from solver.results.known import Known
+from solver.results.measures import HALF_PEAK_TO_PEAK
 from solver.results.notes import ABOVE_FRICTION
 from solver.scene.parameter_paths import check_frequency
 from solver.scene.scene import Scene
@@ -38,6 +42,8 @@ if TYPE_CHECKING:
     from solver.continuation.branch import Branch
 
 NEARBY = 0.9  # of a frequency: there, an undamped resonance is no reason for a large receptance
+
+_OPEN = (MEAN_UNDETERMINED, HISTORY_DEPENDENT)
 
 
 def solve(
@@ -90,7 +96,7 @@ def solve(
         good_enough = good_enough and reached
     if not found.converged:
         # Loaded here: it brings the kernels of a walk along, which an answer does without.
-        from solver.continuation.endings import too_stiff
+        from solver.continuation.stretches import too_stiff
 
         failed = _failure(workspace.balance, frequency_hz, found, clock() - begun)
         if not found.ratchets and (workspace.law_fails(omega) or workspace.law_fails(omega, found.u)):
@@ -213,3 +219,53 @@ def _failure(balance: Balance, frequency_hz: float, found: PointSolution, second
         highest=balance.highest_harmonic, flags=(ABOVE_FRICTION,) if found.above_friction else (),
         residual=found.residual, newton_iterations=found.iterations, seconds=seconds,
     )  # fmt: skip
+
+
+def known_of(branch: Branch) -> Known:
+    """Return how well the highest peak of a branch is known, `Branch.known`.
+
+    Where the mean of the peak is free, it is judged by half peak to peak: max|x| depends on the history.
+    So it is where the scene observes half peak to peak.
+    """
+    peak = branch.peak
+    if peak is None:
+        return Known(flags=branch.flags)
+    there = peak_response(branch)
+    known = Known(
+        peak_max_abs=peak.value, error_estimate=branch.error_estimate,
+        flags=tuple(dict.fromkeys((*branch.flags, *(flag for flag in there.flags if flag in _OPEN)))),
+        notes=band_end_of(branch), peaks_open=tuple(unsettled([branch.peak_certificate])),
+    )  # fmt: skip
+    if branch.balance.scene.observe.centred:
+        return replace(
+            known, measure=HALF_PEAK_TO_PEAK, peak_max_abs=there.max_abs, error_estimate=math.nan,
+            peak_half_peak_to_peak=peak.value, half_peak_to_peak_error=branch.error_estimate,
+        )  # fmt: skip
+    if MEAN_UNDETERMINED not in there.flags:
+        return known
+    at = float(branch.balance.parameter.inside(peak.at))
+    error = ErrorEstimator(Workspace.of(branch.balance)).at(peak.solution, at, across=peak.interior)
+    return replace(
+        known, measure=HALF_PEAK_TO_PEAK, peak_half_peak_to_peak=there.half_peak_to_peak,
+        half_peak_to_peak_error=error.half_peak_to_peak,
+    )  # fmt: skip
+
+
+def known_of_solution(solution: Solution) -> Known:
+    """Return how well the amplitude of one response is known."""
+    flags = tuple(flag for flag in solution.flags if flag not in ("all_stuck", "separation"))
+    if not solution.converged:
+        return Known(flags=flags)
+    if MEAN_UNDETERMINED in flags or solution.scene.observe.centred:
+        return Known(
+            measure=HALF_PEAK_TO_PEAK, peak_max_abs=solution.max_abs,
+            peak_half_peak_to_peak=solution.half_peak_to_peak,
+            half_peak_to_peak_error=solution.error_estimate, flags=flags,
+        )  # fmt: skip
+    return Known(peak_max_abs=solution.max_abs, error_estimate=solution.error_estimate, flags=flags)
+
+
+def relative_sum(*parts: Known) -> float:
+    """Return the relative error of a product or a ratio of peaks; NaN if one of them is not known."""
+    total = sum(part.relative for part in parts)
+    return total if math.isfinite(total) else math.nan

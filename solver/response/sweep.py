@@ -9,8 +9,8 @@ from typing import Any, ParamSpec
 
 from solver.continuation.branch import AnyBranch, Branch
 from solver.continuation.branches.sweep import sweep as by_continuation
-from solver.continuation.continuation_settings import ContinuationSettings
-from solver.continuation.segment import Course
+from solver.continuation.stretches import Course
+from solver.continuation.walk import ContinuationSettings
 from solver.lab import from_lab
 from solver.scene.scene import Scene
 

@@ -2,6 +2,19 @@
 
 Every derivative goes through the whole solve, du/dp = −(∂r/∂u)⁻¹ ∂r/∂p. The Jacobian is factorised once, and
 one substitution a parameter serves all measures of all contacts.
+
+Each measure comes with its slopes along any changes of the solution and of λ, exactly:
+
+- friction work W = ∮ f du = π Σ_k F_k · (dU/dτ)_k, bilinear in force and motion. The motion has the harmonics
+  kept only, so this is the work of the whole force of the law, not of its first harmonics.
+- least normal load: N0 − |N1| of a given load of one harmonic; of any other, and of one that gains kn v, its
+  minimum over the period, whose place is stationary (envelope theorem).
+- slip travel: with w_ξ = ξ kt u − μ N the slider moves by dw_ξ/kt while the contact slips towards ξ, so every
+  slip adds the difference of w_ξ at its ends. It begins where w_ξ = −ξ c, with the offset c of the stick
+  before, fixed at that stick's onset, and ends where dw_ξ/dτ = 0: these instants drop out of the
+  derivative. Where N = 0 begins or ends it, or begins the stick before it, dτ = −dN/(dN/dτ) does not.
+
+Design derivation of the last from the law of `solver.contacts.kernels.stick_slip_events`.
 """
 
 from __future__ import annotations
@@ -9,7 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -19,22 +32,238 @@ from solver.balance.kernels.residual import contact_values, evaluate
 from solver.balance.parameter import Kind
 from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.balance.workspace import Workspace
-from solver.contacts.kernels.columns import OMEGA
-from solver.contacts.kernels.system import System, by_reference, evaluation_by_value
-from solver.contacts.segments import Shares
+from solver.contacts.kernels.columns import KT, MU, OMEGA
+from solver.contacts.kernels.stick_slip_events import AFTER_SLIP, LIFTING, SLIP, UNLOADED, largest
+from solver.contacts.kernels.system import Evaluation, System, by_reference, evaluation_by_value
+from solver.contacts.segments import Segments, Shares, segments_of
 from solver.errors import SettingError
 from solver.jit import fourier
-from solver.jit.fourier import Real
+from solver.jit.fourier import Integer, Real
+from solver.jit.trig_polynomial import grid_size, grid_tables, on_grid
 from solver.linear.kernels.receptance import receptance
 from solver.response.solution import Solution, check_converged
-from solver.response.wear_measures import (
-    Change,
-    ContactCycle,
-    friction_work,
-    least_load,
-    slip_travel,
-)
 from solver.results.told import Piece
+
+_ROUNDING = 1e-13  # of the terms of a sum that cancel
+
+
+class Change(NamedTuple):
+    """A change of a solution and of λ, to the first order: what a slope is taken along."""
+
+    dU: Real  # (n_ports, n) motions
+    dF: Real  # (n_ports, n) forces, the share of λ at fixed motions
+    row: Real  # (n_contacts, ·) contact table
+    load: Real  # (n_contacts, 1 + 2 K) coefficients of the given normal load
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactCycle:
+    """All contacts over one period at a solution; copies, so that the workspace may go on."""
+
+    balance: Annotated[Balance, "What was solved."]
+    U: Annotated[Real, "Coefficients of motions [m], (n_ports, n)."]
+    F: Annotated[Real, "Coefficients of forces [N], (n_ports, n)."]
+    dF_dU: Annotated[Real, "As in `solver.contacts.kernels.system.Evaluation`, (blocks, n, n)."]
+    table: Annotated[Real, "Parameters of the contacts at this λ, (n_contacts, ·)."]
+    load: Annotated[Real, "Coefficients of the given normal loads [N], (n_contacts, 1 + 2 K)."]
+
+    @classmethod
+    def of(cls, balance: Balance, u: Real, p: float, point: Evaluation) -> ContactCycle:
+        """Return the cycle at (u, λ = `p`, inside unit), where `point` was evaluated last."""
+        table, load, _, _ = contact_values(balance.system, p, 0.0)
+        U = u.reshape(balance.n_ports, balance.n_coefficients).copy()
+        return cls(balance=balance, U=U, F=point.F.copy(), dF_dU=point.dF_dU.copy(), table=table, load=load)
+
+    @property
+    def top(self) -> int:
+        """Highest harmonic of the full coefficients below, those of the given loads among them."""
+        return max(self.balance.highest_harmonic, int(self.balance.system.load_ks[-1]))
+
+    def ports(self, e: int) -> range:
+        """Return the relative motions of contact `e`."""
+        first = self.balance.system.first_port
+        return range(int(first[e]), int(first[e + 1]))
+
+    def full(self, coefficients: Real) -> Real:
+        """Return coefficients (..., n) of the harmonics kept, spread over all up to `top`."""
+        return fourier.to_full(coefficients, self.balance.system.ks, self.top)
+
+    def normal_load(self, e: int) -> Real:
+        """Return the coefficients (2 top + 1,) of the normal load of contact `e`, not cut at 0 [N]."""
+        N = np.zeros(2 * self.top + 1)
+        N[: self.load.shape[1]] = self.load[e]
+        normal = self.balance.system.normal_port[e]
+        if normal >= 0:
+            N += self.table[e, self._stiffness(normal)] * self.full(self.U[normal])
+        return N
+
+    def load_change(self, e: int, change: Change) -> Real:
+        """Return the change of `normal_load`."""
+        dN = np.zeros(2 * self.top + 1)
+        dN[: self.load.shape[1]] = change.load[e]
+        normal = self.balance.system.normal_port[e]
+        if normal >= 0:
+            dN += change.row[e, self._stiffness(normal)] * self.full(self.U[normal])
+            dN += self.table[e, self._stiffness(normal)] * self.full(change.dU[normal])
+        return dN
+
+    def _stiffness(self, port: int) -> int:
+        """Return the column of a port's stiffness."""
+        return int(self.balance.system.held[port, 0])
+
+    def has_friction(self, e: int) -> bool:
+        """Return whether contact `e` has a normal load and rubs."""
+        return self.balance.scene.contacts[e].friction is not None
+
+    def segments(self, e: int) -> Segments:
+        """Return what contact `e`, whose slider moves on a line, does over the period."""
+        row, slip = self.table[e], self.full(self.U[self.ports(e)[0]])
+        return segments_of(slip, self.normal_load(e), row[KT], row[MU])
+
+
+def friction_work(cycle: ContactCycle, e: int, changes: Sequence[Change]) -> tuple[float, Real]:
+    """Return the work that friction takes out at contact `e` in one period [J], and its slopes.
+
+    Of a rubbing contact it is that of the tangential force: the normal one moves nothing across the surface.
+    """
+    work, slopes = 0.0, np.zeros(len(changes))
+    system, ports = cycle.balance.system, cycle.ports(e)
+    for a in cycle.balance.scene.contacts[e].RUBBING:
+        U, F = cycle.U[ports[a]], cycle.F[ports[a]]
+        dU = np.array([change.dU[ports[a]] for change in changes]).reshape(-1, U.size)
+        dF = np.array([
+            change.dF[ports[a]] + force_change(system, e, a, cycle.dF_dU, change.dU) for change in changes
+        ]).reshape(-1, U.size)  # fmt: skip
+        done, rises = work_of(U, F, dU, dF, system.ks)
+        work += float(done)
+        slopes += rises
+    return work, slopes
+
+
+def force_change(system: System, e: int, a: int, dF_dU: Real, dU: Real) -> Real:
+    """Return the change of the force (n,) at port `a` of contact `e` for motions that change by `dU`."""
+    first, ports = system.first_block[e], range(int(system.first_port[e]), int(system.first_port[e + 1]))
+    changes = [dF_dU[first + a * len(ports) + b] @ dU[port] for b, port in enumerate(ports)]
+    total: Real = np.sum(changes, axis=0) if len(ports) > 1 else changes[0]
+    return total
+
+
+def work_of(U: Real, F: Real, dU: Real, dF: Real, ks: Integer) -> tuple[Real, Real]:
+    """Return the work of forces F on motions U in a period [J], (...,), and its changes by dU and dF.
+
+    All are coefficients (..., n). A stuck contact does none: what is left of terms that cancel is not work,
+    and 0 is the least, so that the change is 0 too.
+    """
+    speed = _speed(U, ks)
+    done = np.sum(F * speed, axis=-1)
+    real = np.abs(done) > _ROUNDING * np.sum(np.abs(F * speed), axis=-1)
+    rises = np.sum(dF * speed + F * _speed(dU, ks), axis=-1)
+    return math.pi * np.where(real, done, 0.0), math.pi * np.where(real, rises, 0.0)
+
+
+def work_pairing(ks: Integer, n: int) -> Real:
+    """Return the matrix P (n, n) of the work F·(P U) in a period."""
+    return math.pi * _speed(np.eye(n), ks).T
+
+
+def _speed(coefficients: Real, ks: Integer) -> Real:
+    """Return the coefficients (..., n) of dq/dτ for those of the ascending harmonics `ks` alone."""
+    first = int(ks[0] == 0)
+    orders = ks[first:]
+    result = np.zeros_like(coefficients)
+    result[..., first::2] = orders * coefficients[..., first + 1 :: 2]
+    result[..., first + 1 :: 2] = -orders * coefficients[..., first::2]
+    return result
+
+
+def least_load(cycle: ContactCycle, e: int, changes: Sequence[Change]) -> tuple[float, Real] | None:
+    """Return the least normal load of contact `e` over the period [N], and its slopes.
+
+    Below 0 the contact separates: the number is what the load would be if it could pull. None of a law
+    without friction. A load that does not vary has a corner there: its slope is that of any variation's rise.
+    """
+    if not cycle.has_friction(e):
+        return None
+    N, dN = cycle.normal_load(e), [cycle.load_change(e, change) for change in changes]
+    if not np.any(N[3:]) and not any(np.any(each[3:]) for each in dN):
+        swing = math.hypot(N[1], N[2])
+        rises = [(N[1:3] @ d[1:3]) / swing if swing > 0.0 else math.hypot(d[1], d[2]) for d in dN]
+        slopes = [float(d[0] - rise) for d, rise in zip(dN, rises, strict=True)]
+        return float(N[0] - swing), np.array(slopes)
+    if not np.all(np.isfinite(N)):
+        return math.nan, np.full(len(changes), math.nan)
+    at = fourier.basis(np.array([lowest(N)]), cycle.top)[0]
+    return float(at @ N), np.array([float(at @ each) for each in dN])
+
+
+def slip_travel(cycle: ContactCycle, e: int, changes: Sequence[Change]) -> tuple[float, Real] | None:
+    """Return the distance that contact `e` rubs in one period [m], and its slopes.
+
+    None of a law whose slider does not move on a line.
+    """
+    if not cycle.balance.scene.contacts[e].slides_on_a_line:
+        return None
+    kt, mu, port = cycle.table[e, KT], cycle.table[e, MU], cycle.ports(e)[0]
+    U, N = cycle.full(cycle.U[port]), cycle.normal_load(e)
+    ends = _slip_ends(cycle.segments(e))
+    e_tau = fourier.basis(ends.tau, cycle.top)
+    xi, sign = ends.direction, ends.sign
+    u, load = e_tau @ U, e_tau @ N
+    travel = float(sign @ (xi * kt * u - mu * load) / kt)
+    du_dtau, dN_dtau = e_tau @ fourier.derivative(U), e_tau @ fourier.derivative(N)
+    moving = ends.moves & (dN_dtau != 0.0)
+    slopes = np.zeros(len(changes))
+    for j, change in enumerate(changes):
+        du = e_tau @ cycle.full(change.dU[port])
+        dload = e_tau @ cycle.load_change(e, change)
+        dtau = np.where(moving, -dload / np.where(moving, dN_dtau, 1.0), 0.0)
+        dkt, dmu = change.row[e, KT], change.row[e, MU]
+        dw = xi * (dkt * u + kt * (du + du_dtau * dtau)) - dmu * load - mu * (dload + dN_dtau * dtau)
+        slopes[j] = (float(sign @ dw) - travel * dkt) / kt
+    return travel, slopes
+
+
+class _Ends(NamedTuple):
+    """Terms ± w_ξ(τ) whose sum is kt times the distance rubbed, (count,) each."""
+
+    sign: Real
+    direction: Real
+    tau: Real
+    moves: np.ndarray  # bool: an instant of N = 0
+
+
+def _slip_ends(found: Segments) -> _Ends:
+    """Return where the slips of a period begin and end, as terms of the travel."""
+    rows, lifting = found.rows, found.state == LIFTING
+    terms: list[tuple[float, float, float, bool]] = []
+    for i, row in enumerate(rows):
+        if row.motion != SLIP:
+            continue
+        xi = float(row.direction)
+        followed = i + 1 < len(rows) and rows[i + 1].begin == row.end
+        terms.append((1.0, xi, float(row.end), lifting and not followed))
+        follows = i > 0 and rows[i - 1].end == row.begin
+        before = rows[i - 1]
+        if not follows or before.motion == SLIP:
+            terms.append((-1.0, xi, float(row.begin), lifting and not follows))
+        elif before.began == AFTER_SLIP:
+            d = float(before.direction)
+            terms.append((-xi * d, d, float(before.onset), False))
+        elif before.began != UNLOADED:
+            terms.append((-1.0, xi, float(before.onset), True))
+    table = np.array(terms, dtype=np.float64).reshape(-1, 4)
+    return _Ends(sign=table[:, 0], direction=table[:, 1], tau=table[:, 2], moves=table[:, 3] > 0.0)
+
+
+def lowest(N: Real) -> float:
+    """Return where a load with coefficients `N` is least [rad]."""
+    top = (N.size - 1) // 2
+    c, s = np.zeros(top + 1), np.zeros(top + 1)
+    c[0], c[1:], s[1:] = -N[0], -N[1::2], -N[2::2]
+    n = grid_size(top)
+    value, slope = np.zeros(n), np.zeros(n)
+    on_grid(c, s, top, *grid_tables(n, top), value, slope)
+    return float(largest(c, s, top, value, slope)[1])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

@@ -1,7 +1,7 @@
 """The utilisation of a recovered stress at the worst mean that contacts which stick all the time may hold.
 
 Where the mean of a response depends on how it began (`MEAN_UNDETERMINED`), a stress is judged by the largest
-mean that is possible, the upper end of `solver.response.mean_range`. A band is run through: what slips at one
+mean that is possible, the upper end of `held_contacts.mean_range`. A band is run through: what slips at one
 of its frequencies may hold anything at the others, and so may all that sticks where the flag is set at the
 peak, or where contacts have the least room. Else a start from rest leads to the mean that was found, but
 another may not: of a mean load that stuck contacts hold there any part may be lost, and a stress is judged by
@@ -27,8 +27,7 @@ from solver.balance.kernels.output import extremes
 from solver.balance.parameter import Kind
 from solver.balance.workspace import PointSolution, Workspace
 from solver.contacts.kernels.columns import MU
-from solver.continuation.branch import Branch
-from solver.continuation.peak import Peak
+from solver.continuation.branch import Branch, Peak
 from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Real
@@ -36,8 +35,16 @@ from solver.jit.timer import clock
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.model import LinearModel
 from solver.response.contact_response import ContactState, code_of, contact_responses
-from solver.response.held_contacts import HeldContact, held_contacts, instants_of
-from solver.response.mean_range import Room, mean_gain_slopes, mean_gains, rooms_of, shares
+from solver.response.held_contacts import (
+    HeldContact,
+    Room,
+    held_contacts,
+    instants_of,
+    mean_gain_slopes,
+    mean_gains,
+    rooms_of,
+    shares,
+)
 from solver.response.solution import MEAN_UNDETERMINED, Solution
 from solver.response.solve import describe
 from solver.results.notes import MEAN_STRESS_OPEN, WORST_MEAN

@@ -31,17 +31,18 @@ from solver.balance.kernels.residual import contact_values, evaluate
 from solver.balance.parameter import Kind
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import evaluation_by_value
-from solver.continuation.between import closing_in, dense_between
+from solver.continuation.bracketing import closing_in, dense_between
 from solver.continuation.branch import Branch
 from solver.continuation.extrema.extrema import MOST_HALVINGS, NEAR_THE_TOP, PREDICTED
 from solver.continuation.extrema.nodes import share_scales
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
-from solver.response.wear import Measured, WearSensitivity
-from solver.response.wear_measures import (
+from solver.response.wear import (
     Change,
     ContactCycle,
+    Measured,
+    WearSensitivity,
     force_change,
     friction_work,
     least_load,

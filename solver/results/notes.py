@@ -97,6 +97,6 @@ def between_points(*, known: bool, reason: str) -> str:
 
     Parameters
     ----------
-    known, reason : of a `solver.continuation.peak_certificate.PeakCertificate`.
+    known, reason : of a `solver.continuation.branch.PeakCertificate`.
     """
     return NONE_HIGHER if known else reason[:1].lower() + reason[1:]

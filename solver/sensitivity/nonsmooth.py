@@ -22,7 +22,7 @@ import numpy as np
 
 from solver.balance.balance import Balance
 from solver.balance.workspace import Workspace
-from solver.continuation.peak import Peak
+from solver.continuation.branch import Peak
 from solver.jit.fourier import Real
 from solver.results.told import Piece
 from solver.sensitivity.gradient import Sensitivities

@@ -12,9 +12,8 @@ import numpy as np
 from solver.contacts.kernels.stick_slip_events import largest
 from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.observation import highest_peaks, observing
-from solver.continuation.branches.samples import sampled
-from solver.continuation.branches.sweep import sweep
-from solver.continuation.continuation_settings import ContinuationSettings
+from solver.continuation.branches.sweep import sampled, sweep
+from solver.continuation.walk import ContinuationSettings
 from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Real

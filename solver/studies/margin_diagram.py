@@ -16,10 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from solver.balance.balance import check_harmonics
-from solver.continuation.branch import Branch, BranchStatus
+from solver.continuation.branch import Branch, BranchStatus, Peak
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
-from solver.continuation.peak import Peak
 from solver.errors import SettingError, at
 from solver.jit.timer import clock
 from solver.response.worst_mean import WorstMeanSlopes, used_most

@@ -13,7 +13,7 @@ from dataclasses import replace
 from solver.continuation.branch import Branch, BranchStatus
 from solver.errors import SettingError, check_count
 from solver.jit.timer import clock
-from solver.response.known_of_response import relative_sum
+from solver.response.solve import relative_sum
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.scene import Scene
 from solver.scene.scene_records import LumpedStructure, Mistuning

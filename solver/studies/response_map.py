@@ -16,10 +16,9 @@ from solver.continuation.parameter_scale import Scale, scale_of
 from solver.errors import SettingError, check_count
 from solver.jit.fourier import Integer, Real
 from solver.jit.timer import clock
-from solver.response import band_end
-from solver.response.known_of_response import known_of_solution
+from solver.response.plausibility import band_end_at
 from solver.response.solution import MEAN_UNDETERMINED
-from solver.response.solve import solve
+from solver.response.solve import known_of_solution, solve
 from solver.results.known import NOTHING_KNOWN, Known
 from solver.results.watch import part_of, shows_progress
 from solver.scene.scene import Scene
@@ -205,7 +204,7 @@ class MapGrid:
         point = solve(here, frequency_hz=hertz, harmonics=self.harmonics, effects=self.effects)
         known, height = known_of_solution(point), float(amplitude[row, column])
         same = abs(point.max_abs - height) <= _SAME * height or MEAN_UNDETERMINED in known.flags
-        at_end = band_end.of_frequency(here, hertz, (float(self.band[0]), float(self.band[-1])))
+        at_end = band_end_at(here, hertz, (float(self.band[0]), float(self.band[-1])))
         return replace(known if same else Known(flags=known.flags), notes=at_end)
 
 

@@ -38,8 +38,7 @@ from service.jobs.kinds.shape_preview import (
 )
 from service.jobs.outputs import JobOutput, Progress, ShouldStop, Silent
 from service.jobs.studies.solve_study import solve_result
-from solver.continuation.branch import AnyBranch
-from solver.continuation.peak_certificate import PeakCertificate
+from solver.continuation.branch import AnyBranch, PeakCertificate
 from solver.errors import Issue
 from solver.jit.beside import interpret
 from solver.scene.descriptions import DAMPER_LOAD

@@ -14,12 +14,10 @@ from solver.balance.kernels.residual import evaluate
 from solver.balance.rounding import resonates_undamped
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import DENSE, UTILISED
-from solver.continuation.branch import Branch, BranchStatus, Points
+from solver.continuation.branch import Branch, BranchStatus, Peak, Points
 from solver.continuation.branches.sweep import surveyed, with_error, with_points
 from solver.continuation.extrema.extrema import Survey
-from solver.continuation.extrema.node_table import PointRow
-from solver.continuation.extrema.nodes import NodeSolver, numbers_of
-from solver.continuation.peak import Peak
+from solver.continuation.extrema.nodes import NodeSolver, PointRow, numbers_of
 from solver.jit.fourier import Real
 from solver.jit.timer import clock
 from solver.linear.kernels.receptance import observer_receptance, receptance

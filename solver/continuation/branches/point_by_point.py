@@ -21,10 +21,8 @@ from solver.balance.balance import Balance
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import DENSE, MODES
 from solver.continuation.branch import BranchStatus
-from solver.continuation.extrema.node_table import PointRow
-from solver.continuation.extrema.nodes import NodeSolver
-from solver.continuation.segment import Stretch
-from solver.continuation.stretches import ending
+from solver.continuation.extrema.nodes import NodeSolver, PointRow
+from solver.continuation.stretches import Stretch, ending
 from solver.continuation.walk import walk
 from solver.jit.fourier import Real
 from solver.jit.timer import clock

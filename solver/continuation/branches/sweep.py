@@ -2,6 +2,11 @@
 
 It is taken in stretches (`solver.continuation.stretches`), so that the caller can watch and stop; here the
 result is put together.
+
+Where the response is unique (`solver.continuation.branches.point_by_point`) every solution at a frequency is
+the response there, whatever it was found from. Steps along an arc are short wherever contacts change, also
+far below the peaks: who looks for the highest peak alone begins with few points, `sampled`, and solves for
+more where it may stand (`solver.continuation.extrema.extrema`).
 """
 
 from __future__ import annotations
@@ -19,22 +24,31 @@ from solver.balance.rounding import resonates_undamped
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import is_spanned
-from solver.continuation.branch import ROWS, Branch, BranchStatus, Points
+from solver.continuation.branch import ROWS, Branch, BranchStatus, Peak, Points, uncertain
 from solver.continuation.branches.adaptive_harmonics import sweep_to
 from solver.continuation.branches.point_by_point import is_unique, rows_before_a_turn, walk_by_points
 from solver.continuation.branches.symmetry_breaking import branch_flags
-from solver.continuation.continuation_settings import ContinuationSettings
-from solver.continuation.endings import AHEAD, ends_undamped, too_stiff
 from solver.continuation.extrema.branch_error import branch_error
 from solver.continuation.extrema.extrema import Survey, band_limit
+from solver.continuation.extrema.nodes import NodeSolver, PointRow
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.continuation.kernels import walk_state as walk_states
 from solver.continuation.kernels.pseudo_arclength import begin_walk
 from solver.continuation.parameter_scale import check_range
-from solver.continuation.peak import Peak
-from solver.continuation.peak_certificate import uncertain
-from solver.continuation.segment import Course, Stretch, go_on_from, joined, rows_of
-from solver.continuation.stretches import BranchStretches, control_of, ending
+from solver.continuation.stretches import (
+    AHEAD,
+    BranchStretches,
+    Course,
+    Stretch,
+    control_of,
+    ending,
+    ends_undamped,
+    go_on_from,
+    joined,
+    rows_of,
+    too_stiff,
+)
+from solver.continuation.walk import ContinuationSettings
 from solver.continuation.walk import walk as along
 from solver.errors import SettingError
 from solver.jit.fourier import Real, to_full
@@ -52,6 +66,8 @@ _MOST_FOLLOWED = 500  # points of a look at a resonance beside the branch
 _LOST = (
     BranchStatus.STALLED, BranchStatus.TURNED_BACK, BranchStatus.TOO_MANY_POINTS, BranchStatus.POWER_LOST,
 )  # fmt: skip
+
+LEAST, STEP = 40, 0.015  # intervals of a range at least, and share of a frequency that one is long at most
 
 
 @shows_progress("sweep")
@@ -347,3 +363,61 @@ def highest_between(balance: Balance, low: float, high: float, guess: Real) -> P
             break
     survey = Survey.of(workspace, joined(stretches))
     return survey.peaks[0] if survey.peaks else None
+
+
+def sampled(
+    scene: Scene, start: float | None, stop: float | None, harmonics: int,
+    should_stop: ShouldStop = None,
+) -> Branch | None:  # fmt: skip
+    """Return the response at a few frequencies of a range [Hz], without peaks.
+
+    None if it is not unique, nothing damps it, or a frequency has no solution.
+    """
+    begun = clock()
+    balance = build(scene, harmonics=harmonics)
+    if not is_unique(balance) or balance.parameter.kind is not Kind.FREQUENCY:
+        return None
+    low, high = scene.observe.band
+    start, stop = check_range(
+        balance.parameter, low if start is None else start, high if stop is None else stop
+    )
+    workspace = Workspace.of(balance)
+    solver = NodeSolver(workspace)
+    first, last = map(balance.parameter.inside, (start, stop))
+    if resonates_undamped(balance, first, last):
+        return None
+    count = max(LEAST, math.ceil(abs(math.log(last / first)) / STEP))
+    places = np.geomspace(first, last, count + 1).tolist()
+    node, status = solver.at(places[0], [], math.copysign(1.0, last - first)), BranchStatus.COMPLETED
+    nodes = [] if node is None else [node]
+    for p in places[1:]:
+        if should_stop is not None and should_stop():
+            status = BranchStatus.STOPPED
+            break
+        more = _until(solver, nodes[-1], p, count) if nodes else []
+        if not more:
+            return None
+        nodes += more
+    branch = without_peaks(balance, solver.points_of(nodes), status, start, stop)
+    return replace(
+        branch, newton_iterations=solver.spent, seconds=clock() - begun,
+        flags=branch_flags(workspace, branch.solutions),
+    )  # fmt: skip
+
+
+def _until(solver: NodeSolver, last: PointRow, p: float, intervals: int) -> list[PointRow]:
+    """Return the node at the next of so many λ, or those of the arc there where Newton's method fails.
+
+    None where the arc does not lead there either.
+    """
+    length = p - last.at
+    ahead = last.solution[:-1] + length * last.tangent[:-1] / last.tangent[-1]
+    node = solver.at(p, [ahead], math.copysign(1.0, length), from_nothing=False)
+    if node is not None:
+        return [node]
+    outside = solver.workspace.balance.parameter.outside
+    settings = ContinuationSettings()
+    settings = replace(settings, range_length=settings.range_length / intervals)
+    ends = float(outside(last.at)), float(outside(p))
+    arc = joined(list(walk(solver.workspace, *ends, settings, last.solution[:-1])))
+    return solver.nodes_of(arc)[1:] if arc.status is BranchStatus.COMPLETED else []

@@ -7,34 +7,42 @@ contact state. First the branch is made dense: narrow resonances that stand betw
 solutions between them. A maximum then shows between two points as a change of sign of its slope along the
 arc, a band edge as a change of sign of amplitude − limit; both are refined by solving on the arc between the
 points, so that folds need no special care. What could not be settled is said in the certificate
-(`solver.continuation.peak_certificate`).
+(`solver.continuation.branch`).
+
+Where a normal load varies the motion is lopsided, and max|x| is the larger of two curves over the frequency.
+A peak of the other one is no peak of max|x|, but a parameter may make it one: it is worth following, and a
+sweep shows it for nothing.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.balance.closed_loop_poles import ClosedLoop
-from solver.balance.kernels.locate import EDGE
+from solver.balance.kernels.locate import EDGE, HIGH_PEAK, LOW_PEAK
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS, PIECE, RESIDUAL
 from solver.balance.parameter import Kind
 from solver.balance.workspace import Workspace
-from solver.continuation.between import dense_between
-from solver.continuation.branch import Points
-from solver.continuation.extrema.intervals import CURVES, highest_share, lowest_share, may_cross
+from solver.continuation.bracketing import dense_between, fold_between
+from solver.continuation.branch import Band, Branch, Edge, Peak, PeakCertificate, Points, certified, uncertain
 from solver.continuation.extrema.kernels.interval_kernels import IS_BENT, WAVES, WORTH_POLISHING
-from solver.continuation.extrema.node_table import PointRow
-from solver.continuation.extrema.nodes import NodeSolver, numbers_of
+from solver.continuation.extrema.nodes import Between, NodeSolver, PointRow, numbers_of
 from solver.continuation.extrema.resonance_search import ResonanceSearch, Search
 from solver.continuation.extrema.state_changes import ChangeSearch
-from solver.continuation.folds import fold_between
-from solver.continuation.peak import Band, Edge, Peak
-from solver.continuation.peak_certificate import PeakCertificate, certified, uncertain
 from solver.jit.fourier import Real
+
+CURVES = ((HIGH, HIGH_SLOPE, HIGH_PEAK), (LOW, LOW_SLOPE, LOW_PEAK))
+
+_CURVES = ((HIGH, HIGH_SLOPE, 1.0), (LOW, LOW_SLOPE, -1.0))
+_HIDDEN = 1e-9  # relative distance below max|x| from which a curve is hidden
 
 SHARP_RESIDUAL = 2e-11  # of a peak; what is above was accepted because arcs allowed no better
 NEAR_BY = 1e-2
@@ -59,6 +67,109 @@ MOST_WAVES = 4  # halvings of an interval in which a cubic has a maximum and a m
 MOST_DIPS = 24  # of one in which the amplitude may cross the limit there and back
 
 
+def may_cross(nodes: Sequence[PointRow], between: Between, limit: float) -> NDArray[np.bool_]:
+    """Return where max|x| might cross the limit and come back between nodes, (P − 1,)."""
+    above = np.array([node.measures[MAX_ABS] for node in nodes]) > limit
+    slopes = between.slopes
+    # Between ends above the limit it has to fall at first and to rise at last; else the reverse.
+    falls = np.any((slopes[:, 0] < 0.0) & (slopes[:, 1] > 0.0), axis=1)
+    rises = between.reach > limit
+    return np.asarray((above[:-1] & above[1:] & falls) | (~above[:-1] & ~above[1:] & rises))
+
+
+def highest_share(
+    left: PointRow, right: PointRow, by_share: tuple[float, float], limit: float
+) -> float | None:
+    """Return the share where max|x| may be above the limit between two nodes below it, or None."""
+    for value, slope, _ in CURVES:
+        a, b = left.measures[value], right.measures[value]
+        rise, fall = left.measures[slope] * by_share[0], right.measures[slope] * by_share[1]
+        if rise > 0.0 > fall and max(a, b) + 0.25 * (rise - fall) > limit:
+            return _extreme(a, rise, b, fall)
+    return None
+
+
+def lowest_share(
+    left: PointRow, right: PointRow, by_share: tuple[float, float], limit: float
+) -> float | None:
+    """Return the share where max|x| may be below the limit between two nodes above it, or None.
+
+    It is below only where both curves are; the tangents at the ends bound a curve that is bent upward, such
+    as the one of a motion that passes through zero.
+    """
+    places = []
+    for value, slope, _ in CURVES:
+        a, b = left.measures[value], right.measures[value]
+        fall, rise = left.measures[slope] * by_share[0], right.measures[slope] * by_share[1]
+        if a <= limit or b <= limit:
+            # This curve is below somewhere anyway; the other one decides.
+            continue
+        if fall >= 0.0 or rise <= 0.0:
+            return None
+        share = min(max((b - rise - a) / (fall - rise), 0.0), 1.0)
+        if a + fall * share > limit:
+            return None
+        places.append(share)
+    if not places:
+        # One curve is above at each end: between they change places.
+        return 0.5
+    return min(max(sum(places) / len(places), 0.05), 0.95)
+
+
+def _extreme(a: float, da: float, b: float, db: float) -> float:
+    """Return where the cubic of these values and slopes at two ends is extreme, kept off the ends."""
+    chord = b - a
+    c1, c2 = 3.0 * chord - 2.0 * da - db, da + db - 2.0 * chord
+    root = math.sqrt(max(c1 * c1 - 3.0 * c2 * da, 0.0))
+    # The stable form of the root between the ends.
+    below = -c1 - math.copysign(root, c1)
+    places = [da / below if below != 0.0 else 0.5, below / (3.0 * c2) if c2 != 0.0 else 0.5]
+    inside = [t for t in places if 0.0 < t < 1.0]
+    return min(max(inside[0] if inside else da / (da - db), 0.05), 0.95)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rival:
+    """A peak, as near as the points of the branch are."""
+
+    value: Annotated[float, "The higher of the two points it lies between [m]."]
+    omega: Annotated[float, "rad/s."]
+    solution: Annotated[Real, "Slip motions there [m], (n_unknowns,)."]
+    sign: Annotated[float, "1 for a peak of max x, −1 for one of −min x."]
+
+
+def rivals(branch: Branch) -> list[Rival]:
+    """Return the hidden peaks of a branch over the frequency, highest first."""
+    return _crests(branch.solutions, branch.measures, hidden=True)
+
+
+def crests(solutions: Real, measures: Real) -> list[Rival]:
+    """Return the peaks of max|x| between points of a walk over the frequency, highest first.
+
+    Parameters
+    ----------
+    solutions : (P, n_unknowns + 1) slip motions [m] and ω [rad/s].
+    measures : (P, MEASURES) columns named in `solver.balance.kernels.output`.
+    """
+    return _crests(solutions, measures, hidden=False)
+
+
+def _crests(solutions: Real, measures: Real, *, hidden: bool) -> list[Rival]:
+    """Return the peaks of max x and of −min x that the larger of the two hides, or those it does not."""
+    found = []
+    for value, slope, sign in _CURVES:
+        rising, falling = measures[:-1, slope], measures[1:, slope]
+        wanted = (measures[:, value] < (1.0 - _HIDDEN) * measures[:, MAX_ABS]) == hidden
+        for left in np.flatnonzero((rising > 0.0) & (falling <= 0.0) & wanted[:-1] & wanted[1:]):
+            share = rising[left] / (rising[left] - falling[left])
+            between = (1.0 - share) * solutions[left] + share * solutions[left + 1]
+            height = float(measures[left : left + 2, value].max())
+            found.append(
+                Rival(value=height, omega=float(between[-1]), solution=between[:-1].copy(), sign=sign)
+            )
+    return sorted(found, key=lambda rival: -rival.value)
+
+
 class Survey:
     """Looks for peaks and band edges on a branch; counts the Newton iterations it spends.
 
@@ -66,7 +177,7 @@ class Survey:
     ----------
     solver, nodes : of the branch.
     highest_alone : whether the highest peak is all that is wanted. Then the branch is made dense where that
-        may stand alone, and the nodes may be as far apart as those of `solver.continuation.branches.samples`.
+        may stand alone, and the nodes may be as far apart as those of `solver.continuation.branches.sweep`.
     """
 
     def __init__(self, solver: NodeSolver, nodes: list[PointRow], *, highest_alone: bool = False) -> None:

@@ -21,11 +21,9 @@ from typing import Annotated
 import numpy as np
 
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS
-from solver.continuation.between import dense_between
-from solver.continuation.extrema.contact_springs import Resonance
+from solver.continuation.bracketing import dense_between
 from solver.continuation.extrema.kernels.suspects import find_suspects
-from solver.continuation.extrema.node_table import NodeTable, PointRow
-from solver.continuation.extrema.nodes import NodeSolver, numbers_of
+from solver.continuation.extrema.nodes import NodeSolver, NodeTable, PointRow, Resonance, numbers_of
 from solver.jit.fourier import Complex, Flags, Integer, Real
 
 # What a resonance adds to the amplitude, relative to what stands there, from which it is solved for. What

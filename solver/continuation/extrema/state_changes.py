@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from solver.balance.kernels.output import HIGH, LOW, MAX_ABS, PIECE
 from solver.continuation.extrema.kernels.interval_kernels import BENT, MATTERS, STEEP, WORTH_POLISHING
-from solver.continuation.extrema.node_table import PointRow
-from solver.continuation.extrema.nodes import NodeSolver, numbers_of
+from solver.continuation.extrema.nodes import NodeSolver, PointRow, numbers_of
 from solver.jit.fourier import Integer, Real
 
 # Up to these departures from what the points beside an interval foretell a change in it hides no maximum:

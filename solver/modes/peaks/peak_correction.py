@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, cast
 
 import numpy as np
 
-from solver.continuation.between import least_between
+from solver.continuation.bracketing import least_between
 from solver.errors import SettingError
 from solver.jit.fourier import Complex
 from solver.modes.corrector import Corrected, ModeState, correct

@@ -10,8 +10,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from solver.continuation.branch import Branch
-from solver.continuation.peak import Peak
+from solver.continuation.branch import Branch, Peak
 from solver.errors import SettingError
 from solver.lab import LAB, from_lab, is_there
 from solver.linear.assembly import linear_model

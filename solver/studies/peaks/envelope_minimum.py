@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from solver.continuation.between import closing_in
+from solver.continuation.bracketing import closing_in
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, Z
 from solver.jit.fourier import Real
 

@@ -14,10 +14,9 @@ from typing import Annotated
 
 import numpy as np
 
-from solver.continuation.between import least_between, level_up_to
-from solver.continuation.branch import Branch
+from solver.continuation.bracketing import least_between, level_up_to
+from solver.continuation.branch import Branch, Peak
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, Z
-from solver.continuation.peak import Peak
 from solver.jit.timer import clock
 from solver.studies.peaks.envelope_minimum import Lowest, rows_at
 from solver.studies.peaks.track import Look

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from solver.continuation.between import dense_between
+from solver.continuation.bracketing import dense_between
 from solver.continuation.extrema.kernels.peak_continuation import HEIGHT, Z
 from solver.studies.peaks.seeds import Line
 from solver.studies.peaks.tracker import Place, Tracker

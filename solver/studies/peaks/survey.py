@@ -12,9 +12,8 @@ import numpy as np
 
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects
-from solver.continuation.branch import Branch
+from solver.continuation.branch import Branch, Peak
 from solver.continuation.parameter_scale import scale_of
-from solver.continuation.peak import Peak
 from solver.jit.fourier import Real
 from solver.scene.scene import Scene
 from solver.studies.peaks.seeds import Line

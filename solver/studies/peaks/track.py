@@ -15,12 +15,11 @@ import numpy as np
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
-from solver.continuation.branch import Branch
+from solver.continuation.branch import Branch, Peak
 from solver.continuation.branches.sweep import sweep, walk
-from solver.continuation.continuation_settings import ContinuationSettings
-from solver.continuation.extrema.candidates import Rival, crests
-from solver.continuation.peak import Peak
-from solver.continuation.segment import Course, Stretch
+from solver.continuation.extrema.extrema import Rival, crests
+from solver.continuation.stretches import Course, Stretch
+from solver.continuation.walk import ContinuationSettings
 from solver.jit.fourier import Integer
 from solver.scene.scene import Scene
 from solver.studies.peaks.track_results import TrackStatus

@@ -8,7 +8,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, Annotated, ClassVar, NamedTuple
 
 from solver.arrays import Real
-from solver.continuation.peak_certificate import unsettled
+from solver.continuation.branch import unsettled
 from solver.errors import SettingError
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known

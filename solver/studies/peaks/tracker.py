@@ -18,7 +18,8 @@ from solver.balance.simplifications import Effects
 from solver.balance.speed_line import check_no_line
 from solver.contacts.kernels.system import System, by_reference
 from solver.contacts.laws.contact_law import without_second
-from solver.continuation.extrema.candidates import Rival, rivals
+from solver.continuation.branch import Peak
+from solver.continuation.extrema.extrema import Rival, rivals
 from solver.continuation.extrema.kernels.peak_continuation import (
     COLUMNS,
     HEIGHT,
@@ -36,7 +37,6 @@ from solver.continuation.extrema.kernels.peak_state import (
     summit_numbers,
     summit_seconds,
 )
-from solver.continuation.peak import Peak
 from solver.continuation.walk import walk
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real

@@ -23,12 +23,12 @@ from solver.balance.simplifications import breaks_symmetry
 from solver.balance.workspace import PointSolution, Workspace
 from solver.continuation.branch import BranchStatus, Points
 from solver.continuation.branches.sweep import walk
-from solver.continuation.marks import MarkKind
-from solver.continuation.segment import Stretch, joined
-from solver.continuation.continuation_settings import ContinuationSettings
+from solver.continuation.branch import MarkKind
+from solver.continuation.stretches import Stretch, joined
+from solver.continuation.walk import ContinuationSettings
 from solver.jit.fourier import Real, from_full, to_full
 from solver.response.stability.bifurcations import Along
-from solver.response.stability.switching import leaving
+from solver.response.stability.bifurcations import leaving
 
 SAME = 1e-5  # relative difference of two motions below which they are one
 _DEFLATED_STEPS = 40

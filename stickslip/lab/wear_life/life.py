@@ -14,7 +14,7 @@ from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.continuation.branches.sweep import sweep
 from solver.errors import SettingError, check_count
 from solver.jit.timer import clock
-from solver.response.known_of_response import known_of_solution
+from solver.response.solve import known_of_solution
 from solver.response.solve import solve
 from solver.results.known import NOTHING_KNOWN, Known
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress

@@ -28,8 +28,8 @@ from solver.continuation.extrema.kernels.peak_state import (
     summit_numbers,
     summit_seconds,
 )
-from solver.continuation.peak import Peak
-from solver.continuation.continuation_settings import ContinuationSettings
+from solver.continuation.branch import Peak
+from solver.continuation.walk import ContinuationSettings
 from solver.linear.contact_table import second_numbers
 from solver.response.wear import WearSensitivity
 from solver.results.watch import ShouldStop

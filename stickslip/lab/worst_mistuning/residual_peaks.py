@@ -30,7 +30,7 @@ from solver.jit import fourier
 from solver.linear.contact_table import port_counts
 from solver.response.contact_response import ContactState, contact_responses
 from solver.response.stability.residual_forces import LeftForces
-from solver.response.wear_measures import lowest
+from solver.response.wear import lowest
 from solver.scene.scene import AnyContact, Scene
 from solver.sensitivity.gradient import Sensitivities
 from stickslip.lab.worst_mistuning.climbing import Bounds, root_mean_square

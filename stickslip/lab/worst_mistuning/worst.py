@@ -17,7 +17,7 @@ import numpy as np
 from solver.arrays import Real
 from solver.errors import SettingError
 from solver.jit.timer import clock
-from solver.response.band_end import of_frequency
+from solver.response.plausibility import band_end_at
 from solver.results.notes import notes_of_all
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
@@ -125,7 +125,7 @@ def worst_mistuning(
         rms=rms, detuning=intentional.detuning,
         contacts=how.value, whitehead=whitehead(len(blades)), starts=search.starts,
         climbs=search.climbs if how in _SOLVED else 0, n_harmonics=harmonics, **found,
-        notes=notes_of_all(of_frequency(searched.scene, at, band) for at in places),
+        notes=notes_of_all(band_end_at(searched.scene, at, band) for at in places),
         seconds=clock() - begun,
     )  # fmt: skip
 

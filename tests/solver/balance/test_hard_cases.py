@@ -23,7 +23,7 @@ from solver.balance.kernels.output import RESIDUAL
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.stick_slip_events import LIFTING
 from solver.continuation.branches.sweep import walk
-from solver.continuation.segment import Course
+from solver.continuation.stretches import Course
 from solver.marching.march_result import MarchStatus
 
 LAW = 3e-4  # of the largest friction force: what sampling leaves

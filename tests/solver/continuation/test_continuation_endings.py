@@ -12,7 +12,7 @@ from scene_cases import bladed_disk, oscillator, two_dof
 
 from solver import BranchStatus, ContinuationSettings, SettingError, sweep
 from solver.balance.kernels.output import MAX_ABS
-from solver.continuation.segment import Course
+from solver.continuation.stretches import Course
 from solver.jit.fourier import to_complex
 
 

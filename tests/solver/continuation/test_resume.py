@@ -11,7 +11,7 @@ from scene_cases import bladed_disk, two_dof
 import solver
 from solver import ContinuationSettings, SettingError, Stretch, joined, sweep
 from solver.continuation.branch import Branch, BranchStatus
-from solver.continuation.segment import Course
+from solver.continuation.stretches import Course
 from solver.scene.scene import Scene
 
 FINE = ContinuationSettings(largest_step=0.05)

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import pytest
 
-from solver.continuation.between import closing_in, dense_between, least_between, level_up_to
+from solver.continuation.bracketing import closing_in, dense_between, least_between, level_up_to
 from solver.continuation.walk import Curve, walk
 
 

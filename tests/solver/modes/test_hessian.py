@@ -7,8 +7,7 @@ import pytest
 
 import solver
 from solver.modes.at_amplitudes import ModePoints, damping_hessian, mode_at_amplitudes
-from solver.modes.mode_gradient import ModeSensitivities
-from solver.modes.mode_hessian import mode_hessian
+from solver.modes.mode_gradient import ModeSensitivities, mode_hessian
 from solver.modes.nonlinear_mode import pose
 from tests.cases.matrix_cases import chain_raw
 from tests.cases.mode_cases import one_mass, slider

@@ -9,7 +9,7 @@ import pytest
 import solver
 from solver.modes.peaks.peak_correction import corrected_peak
 from solver.modes.peaks.peak_gradient import peak_at_excitation
-from solver.modes.peaks.performance_range import performance_over
+from solver.modes.peaks.performance import performance_over
 from tests.cases.random_scenes import random_scene
 
 LEVEL = "excitation.amplitude"

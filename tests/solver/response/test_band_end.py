@@ -10,7 +10,7 @@ import pytest
 import optim
 import solver
 from optim.results.design_result import Certainty
-from solver.response.band_end import BAND_END
+from solver.response.plausibility import BAND_END
 from solver.results.notes import Note
 from solver.scene.scene import Scene
 

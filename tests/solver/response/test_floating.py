@@ -24,8 +24,7 @@ from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import UNHELD
 from solver.continuation.branches.point_by_point import walk_by_points
 from solver.continuation.branches.sweep import walk
-from solver.continuation.segment import joined
-from solver.continuation.stretches import balanced_part
+from solver.continuation.stretches import balanced_part, joined
 from solver.linear.condensation import loose_motions
 from solver.marching.march_result import MarchStatus
 

@@ -13,7 +13,7 @@ from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_stiffnesses
 from solver.linear.model import LinearModel
-from solver.response.start_from_rest import Start, keeps_sticking
+from solver.response.history_dependence import Start, keeps_sticking
 
 
 def _disk() -> Scene:

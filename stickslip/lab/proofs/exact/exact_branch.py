@@ -11,13 +11,13 @@ import numpy as np
 from solver.balance.balance import check_harmonics
 from solver.balance.parameter import Kind, Parameter, check_fixed, resolve
 from solver.continuation.branch import AnyBranch
-from solver.continuation.marks import Bifurcations, Mark, MarkKind
-from solver.continuation.peak import Peak
+from solver.continuation.branch import Bifurcations, Mark, MarkKind
+from solver.continuation.branch import Peak
 from solver.jit.fourier import Real
-from solver.response import band_end
+from solver.response.plausibility import band_end_of
 from stickslip.lab.proofs.exact.answer import solve_beside
 from stickslip.lab.proofs.exact.orbit import Orbit
-from solver.response.known_of_response import known_of_solution
+from solver.response.solve import known_of_solution
 from solver.response.solution import MEAN_UNDETERMINED, Solution
 from solver.results.known import Known, Stable, Verdict
 from solver.scene.scene import Scene
@@ -114,7 +114,7 @@ class ExactBranch(AnyBranch):
             return Known(flags=self.flags)
         found = known_of_solution(self.highest)
         return replace(
-            found, notes=band_end.of_branch(self), peaks_open=(self.peak_certificate.reason,)
+            found, notes=band_end_of(self), peaks_open=(self.peak_certificate.reason,)
         )  # fmt: skip
 
     @property

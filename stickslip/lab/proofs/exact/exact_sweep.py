@@ -16,15 +16,15 @@ import numpy as np
 
 from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, MEAN, MEASURES, RESIDUAL
 from solver.balance.parameter import Kind
-from solver.continuation.between import closing_in, least_between
+from solver.continuation.bracketing import closing_in, least_between
 from solver.continuation.branch import BranchStatus
 from solver.continuation.branches.sweep import check_limit
-from solver.continuation.peak_certificate import uncertain
+from solver.continuation.branch import uncertain
 from solver.continuation.extrema.extrema import band_limit
 from solver.continuation.parameter_scale import check_range
-from solver.continuation.peak import Band, Edge, Peak
-from solver.continuation.segment import Course
-from solver.continuation.continuation_settings import ContinuationSettings
+from solver.continuation.branch import Band, Edge, Peak
+from solver.continuation.stretches import Course
+from solver.continuation.walk import ContinuationSettings
 from solver.continuation.walk import Curve, walk
 from solver.errors import SettingError
 from solver.jit.timer import clock

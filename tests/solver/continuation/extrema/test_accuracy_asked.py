@@ -14,7 +14,7 @@ from scene_cases import bladed_disk, loose_mass, oscillator, two_dof
 from service.cli import main
 from solver import BranchStatus, Scene, SettingError, SolutionStatus, branch_errors, solve, sweep
 from solver.continuation.branches import adaptive_harmonics as adaptive
-from solver.continuation.segment import Course
+from solver.continuation.stretches import Course
 
 CASES = {
     "slipping": (two_dof(), 1.2),

@@ -14,7 +14,7 @@ from service.cli import main
 from service.rendering.report.responses_report import ReportLine
 from service.rendering.report.sections import branch_table
 from service.rendering.text import print_told
-from solver.continuation.peak_certificate import uncertain
+from solver.continuation.branch import uncertain
 from solver.results.notes import FLAGS, NONE_HIGHER, flag_words
 from solver.views.tables import responses, tracks
 

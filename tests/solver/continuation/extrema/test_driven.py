@@ -11,7 +11,7 @@ from solver import Scene
 from solver.balance.balance import build
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import MODES, POLES
-from solver.continuation.extrema.driven import Way, may_exceed
+from solver.continuation.extrema.branch_error import Way, may_exceed
 from solver.jit.fourier import Complex, Real
 
 PLACES = 401

@@ -11,7 +11,7 @@ from solver.balance.known_springs import MOST_ENTRIES
 from solver.balance.workspace import Workspace
 from solver.continuation.branches.sweep import walk
 from solver.continuation.extrema.nodes import NodeSolver, numbers_of
-from solver.continuation.segment import joined
+from solver.continuation.stretches import joined
 from solver.jit.fourier import Real
 
 

@@ -6,8 +6,7 @@ import pytest
 import solver
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Points
-from solver.continuation.extrema.node_table import NodeTable
-from solver.continuation.extrema.nodes import NodeSolver
+from solver.continuation.extrema.nodes import NodeSolver, NodeTable
 
 
 def test_rows_keep_their_numbers_while_the_table_grows():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import solver
-from solver.continuation.continuation_settings import ContinuationSettings, Predictor
+from solver.continuation.walk import ContinuationSettings, Predictor
 
 RESPONSES = [
     *(("two-dof", {"damper.N1": N1}, 0.2, 2.6) for N1 in (0.0, 30.0, 200.0)),

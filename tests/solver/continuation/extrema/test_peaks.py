@@ -14,10 +14,9 @@ from solver.balance.balance import build
 from solver.balance.kernels.output import MAX_ABS, SLOPE
 from solver.balance.parameter import Kind
 from solver.balance.workspace import Workspace
-from solver.continuation.branch import Branch
+from solver.continuation.branch import Branch, Peak
 from solver.continuation.extrema.extrema import HALF_POWER, band_limit
 from solver.continuation.extrema.kernels.interval_kernels import WORTH_POLISHING
-from solver.continuation.peak import Peak
 
 HARMONICS = 7
 SCENES = {
