@@ -28,7 +28,6 @@ from solver.linear.natural_frequencies import LARGE, Resonances, resonances
 from solver.matrices.normal_modes import hermitian, least_stiffness, undamped_modes
 from solver.results import units
 from solver.results.notes import Note
-from solver.results.units import number
 from solver.scene.cyclic.annulus import written_out
 from solver.scene.scene import Scene
 from solver.wording import listing
@@ -240,7 +239,7 @@ def band_end_at(scene: Scene, at_hz: float, band: tuple[float, float]) -> tuple[
             if outside.size:
                 numbers[name] = nearest(outside, low, high)
     words = (
-        f"the highest amplitude is at an end of the band, {number(at_hz, _DIGITS)} Hz, and no maximum"
+        f"the highest amplitude is at an end of the band, {units.number(at_hz, _DIGITS)} Hz, and no maximum"
         f"{_outside(numbers) if found is not None else ''}"
     )
     return (Note(name=BAND_END, words=words, numbers=numbers),)
@@ -258,12 +257,12 @@ def _at_end(at_hz: float, band: tuple[float, float]) -> bool:
 def _outside(numbers: dict[str, float]) -> str:
     """Where the nearest linear resonances are."""
     told = [
-        f"{number(numbers[name], _DIGITS)} Hz with all contacts {words}"
+        f"{units.number(numbers[name], _DIGITS)} Hz with all contacts {words}"
         for name, words in (("open_hz", "open"), ("stuck_hz", "stuck"))
         if name in numbers
     ]
     if not told:
         return "; no linear resonance lies outside it"
     if numbers.get("open_hz") == numbers.get("stuck_hz"):
-        told = [f"{number(numbers['open_hz'], _DIGITS)} Hz"]
+        told = [f"{units.number(numbers['open_hz'], _DIGITS)} Hz"]
     return f"; the nearest linear resonance outside it is {' or '.join(told)}"
