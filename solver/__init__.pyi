@@ -6,7 +6,7 @@ from stickslip.lab.proofs.certificate import (
 )
 from .contacts.laws.history.definition import LawParameter as LawParameter
 from .contacts.laws.history.register import register_law as register_law
-from .contacts.segments import Shares as Shares
+from .contacts.pieces.line import Shares as Shares
 from .continuation.branch import AnyBranch as AnyBranch, Branch as Branch, BranchStatus as BranchStatus
 from .continuation.extrema.error_estimate import (
     ErrorEstimate as ErrorEstimate,

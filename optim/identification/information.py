@@ -17,6 +17,7 @@ from optim.identification.fit import HUBER, LocalFit, Runs
 from optim.identification.unknowns import Unknowns
 from optim.problem.variables import Real
 from solver.contacts.kernels.stick_slip_events import SEPARATED, STUCK
+from solver.contacts.laws.friction import FrictionContact
 from solver.jit.fourier import Integer
 from solver.results.told import Piece
 from solver.scene.scene import Scene
@@ -198,7 +199,7 @@ def _together(unknowns: Unknowns, z: Real, direction: Real, at: Sequence[int]) -
 
 def _remedy(names: Sequence[str]) -> str:
     keys = {name.rpartition(".")[2] for name in names}
-    if keys == {"mu", "N0"}:
+    if keys == FrictionContact.IN_THE_LIMIT:
         return (
             "Friction limits μN alone show: measure the load itself and give it as a condition of the "
             "data, or "

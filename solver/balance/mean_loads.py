@@ -16,7 +16,7 @@ import numpy as np
 
 from solver.balance.balance import Balance
 from solver.balance.kernels.residual import contact_values
-from solver.contacts.kernels.columns import MU, N0, PRESTRESSED
+from solver.contacts.kernels.columns import N0, PRESTRESSED
 from solver.contacts.kernels.system import Receptance, System, receptance_by_value
 from solver.contacts.laws.contact_parts import Slider
 from solver.jit import fourier
@@ -106,20 +106,19 @@ def _limits(balance: Balance, table: Real, loads: Real, *, least: bool = False) 
     system = balance.system
     rows, bounds = [np.zeros((0, system.owner.size))], [np.zeros(0)]
     for e, contact in enumerate(balance.scene.contacts):
-        slider = contact.friction
+        slider = contact.with_numbers(table[e]).friction
         if slider is None:
             continue  # what else it is, its force has no limit
         first, normal = int(system.first_port[e]), contact.normal_port
         sides = _sides(slider)
         row = np.zeros((len(sides), system.owner.size))
         row[:, [first + port for port in slider.ports]] = sides
-        mu = float(table[e, MU])
         if normal is None:
-            bound = mu * of_load(loads[e])
+            bound = slider.limit(of_load(loads[e]))
         else:  # μ N with N the normal force and what of it is in equilibrium at rest, N >= 0
-            row[:, first + normal] = -mu
+            row[:, first + normal] = -slider.limit(1.0)
             rest = max(float(table[e, N0]), 0.0) if table[e, PRESTRESSED] > 0.0 else 0.0
-            bound = mu * rest
+            bound = slider.limit(rest)
             pressed = np.zeros((1, system.owner.size))
             pressed[0, first + normal] = -1.0
             rows.append(pressed)

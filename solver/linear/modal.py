@@ -128,10 +128,10 @@ def sizes_of(held: HeldMatrices, shapes: NDArray[Any]) -> Real:
 def _flexible(undamped: UndampedModes, shapes: NDArray[Any], K: NDArray[Any], M: NDArray[Any]) -> Real:
     """Return what rounding of the flexibility adds to the third of the sizes of shapes (n, m), (m,).
 
-    Modes are found to the rounding of the largest μ.
+    Modes are found to the rounding of the largest flexibility.
     """
     energies = (shapes.conj() * ((K + undamped.sigma * M) @ shapes)).sum(axis=0).real
-    return undamped.mu.max(initial=0.0) * energies  # type: ignore[no-any-return]
+    return undamped.flexibility.max(initial=0.0) * energies  # type: ignore[no-any-return]
 
 
 @lru_cache(maxsize=32)
@@ -156,11 +156,13 @@ def decompose(held: HeldMatrices, *, poles: bool = True) -> Decomposition | None
     ):
         phi = np.array([u.phi for u in undamped])
         sizes = sizes_of(held, phi)
-        sizes[2] += [u.mu.max(initial=0.0) / u.mu for u in undamped]
+        sizes[2] += [u.flexibility.max(initial=0.0) / u.flexibility for u in undamped]
         return Decomposition(
             form=MODES,
             eigenvalues=np.array([u.omega2 for u in undamped], dtype=np.complex128),
-            dampings=np.array([np.diag(D).real / u.mu for u, D in zip(undamped, damping, strict=True)]),
+            dampings=np.array(
+                [np.diag(D).real / u.flexibility for u, D in zip(undamped, damping, strict=True)]
+            ),
             right=phi,
             left=phi.conj(),
             sizes=np.array([sizes, sizes]),
@@ -210,8 +212,8 @@ def _poles(
     [[−D, −Ω⁻¹], [Ω⁻¹, 0]] with eigenvalues 1/s, in which the slow poles are the large and accurate ones. E
     is what K has there beside 1, where it is not Hermitian: D and the upper Ω⁻¹ are (1 + E)⁻¹ times so much.
     """
-    n = undamped.mu.size
-    slow = np.diag(np.sqrt(undamped.mu))
+    n = undamped.flexibility.size
+    slow = np.diag(np.sqrt(undamped.flexibility))
     regular = np.eye(n) if E is None else np.linalg.inv(np.eye(n) + E)
     first = (D, slow) if E is None else (regular @ D, regular @ slow)
     state = np.block([[-first[0], -first[1]], [slow, np.zeros((n, n))]])
@@ -224,10 +226,10 @@ def _poles(
     x, yh = v[:n], w[:n].conj() * (-1.0 / (values * norm))
     if E is not None:
         yh = regular.T @ yh
-    fast = 1.0 / np.sqrt(undamped.mu)
+    fast = 1.0 / np.sqrt(undamped.flexibility)
     for s in 1j * np.array([0.01 * fast[-1], 0.3 * fast[-1], 1.7 * fast[-1], 0.7 * fast[0], 3.1 * fast[0]]):
         still = np.eye(n) if E is None else np.eye(n) + E
-        direct = np.linalg.inv(still + s * D + np.diag(s * s * undamped.mu))
+        direct = np.linalg.inv(still + s * D + np.diag(s * s * undamped.flexibility))
         summed = (x / (s - 1.0 / values)) @ yh.T
         if np.abs(summed - direct).max() > SPAN_ERROR * np.abs(direct).max():
             return None

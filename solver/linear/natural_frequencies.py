@@ -91,8 +91,8 @@ def _along_line(K: Complex, model: LinearModel, k: Integer) -> Real:
     """
     inertia, free = model.inertia(model.diameters(k), k)[0], model.free
     even = 0.5 * (K + K.conj().T)[free][:, free]
-    mu = np.linalg.eigvals(np.linalg.solve(even, inertia[free][:, free])).real
-    return np.sort(1.0 / np.sqrt(mu[mu > 0.0])) / (2.0 * math.pi)
+    flexibility = np.linalg.eigvals(np.linalg.solve(even, inertia[free][:, free])).real
+    return np.sort(1.0 / np.sqrt(flexibility[flexibility > 0.0])) / (2.0 * math.pi)
 
 
 def _of_poles(K: Complex, C: Complex, M: Complex) -> Real:

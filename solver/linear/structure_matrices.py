@@ -162,7 +162,7 @@ def modal_damping_derivative(
     if np.any(values <= 0.0):
         raise SettingError("damping_ratio", list(zeta[:3]), "has no derivative where a mode is a rigid body")
     f = 2.0 * zeta * np.sqrt(values)
-    kappa, mu = phi.T @ dK @ phi, phi.T @ dM @ phi
+    kappa, mass = phi.T @ dK @ phi, phi.T @ dM @ phi
     apart = values[None, :] - values[:, None]
     same = np.abs(apart) <= _SAME * np.maximum(values[None, :], values[:, None])
     if np.any(same & (zeta[:, None] != zeta[None, :])):
@@ -172,7 +172,7 @@ def modal_damping_derivative(
     rise = np.where(same, zeta / np.sqrt(values), (f[None, :] - f[:, None]) / gap)
     product = values * f
     bend = np.where(same, 3.0 * zeta * np.sqrt(values), (product[None, :] - product[:, None]) / gap)
-    turned = kappa * rise - mu * bend
+    turned = kappa * rise - mass * bend
     momenta = M @ phi
     change = dM @ phi @ np.diag(f) @ momenta.T
     return np.asarray(momenta @ turned @ momenta.T + change + change.T)

@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 
 from solver.contacts.laws.contact_law import AnyContact
 from solver.contacts.laws.contact_parts import Row
-from solver.marching.kernels.march_state import SparseRows, steady
+from solver.marching.kernels.march_state import Real, SparseRows, System, steady
 from solver.scene.bodies.kinematics import Form
 
 
@@ -54,6 +54,11 @@ def columns(placed: Sequence[tuple[Row, tuple[Form, ...]]], index: dict[str, int
     motions = {"L": sparse_rows(L), "normal": sparse_rows(selection(normal, index, n))}
     swings = {"waves": waves[0], "wave_phases": waves[1], **steady(waves[0])}
     return {**numbers, **counts, **motions, **swings, "law": laws, "powers": powers, "numbers": own}
+
+
+def limit_of(system: System, load: Real) -> Real:
+    """Return the limit of each row's friction for its load [N]."""
+    return np.asarray(system.mu * load)
 
 
 def selection(forms: Sequence[Form], index: dict[str, int], n: int) -> csr_array:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from solver.errors import SettingError
+from solver.marching.contacts import limit_of
 from solver.marching.kernels import march_state as kernel
 from solver.marching.march_equations import MarchEquations
 from solver.wording import listing
@@ -69,7 +70,7 @@ def state_at(
             load[c] += system.kn[c] * kernel.normal_slip(system, x, int(c))
     for c in np.flatnonzero(system.law == kernel.CIRCLE_SECOND):
         load[c] = load[c - 1]
-    closed = np.where(moving, load, system.mu * load) > 0.0
+    closed = np.where(moving, load, limit_of(system, load)) > 0.0
     slips = np.array([kernel.slip(system, x, c) for c in range(rows)])
     closed = np.where(system.law == kernel.GAP, slips > system.gap, closed) | (
         system.law == kernel.POLYNOMIAL
@@ -96,7 +97,7 @@ def _forces(
     system: kernel.System, tractions: Mapping[str, float], names: tuple[str, ...], load: kernel.Real
 ) -> kernel.Real:
     """Return the friction forces of the rows, none beyond its limit."""
-    force = np.zeros(system.kt.size)
+    force, limits = np.zeros(system.kt.size), (1.0 - _INSIDE) * limit_of(system, load)
     for name, traction in tractions.items():
         if name not in names:
             raise SettingError("tractions", name, f"must be of contacts with friction: {listing(names)}")
@@ -108,7 +109,7 @@ def _forces(
         if system.law[c] == kernel.CIRCLE_SECOND:
             continue
         both = force[c : c + (2 if system.law[c] == kernel.CIRCLE else 1)]
-        size, limit = float(np.hypot.reduce(both)), (1.0 - _INSIDE) * float(system.mu[c] * load[c])
+        size, limit = float(np.hypot.reduce(both)), float(limits[c])
         if size > limit:
             both *= limit / size
     return force

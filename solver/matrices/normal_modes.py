@@ -20,26 +20,26 @@ from solver.jit import eigen
 Real = NDArray[np.float64]
 SMALL_PIVOT = 1e-12  # of the scaled K: below it K alone may be singular, and is shifted
 SHIFT = 1e-10  # shift σ relative to the largest K_ii / M_ii
-LEAST = 1e-16  # smallest μ relative to the largest: below is rounding, and only the static share counts
+LEAST = 1e-16  # smallest flexibility relative to the largest: below is rounding, only the static share counts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UndampedModes:
-    """Modes ψ with ψᴴ (K + σ M) ψ = 1 and ψᴴ M ψ = μ, lowest frequency first."""
+    """Modes ψ with ψᴴ (K + σ M) ψ = 1 and ψᴴ M ψ = 1 / (ω² + σ), lowest frequency first."""
 
-    mu: Annotated[Real, "1 / (ω² + σ) [s²], (m,)."]
+    flexibility: Annotated[Real, "1 / (ω² + σ) [s²], (m,)."]
     psi: Annotated[NDArray[Any], "One mode a column, (n, m)."]
     sigma: Annotated[float, "σ [rad²/s²], 0 if K alone is positive definite."]
 
     @property
     def omega2(self) -> Real:
         """Squares of the natural frequencies [rad²/s²]."""
-        return 1.0 / self.mu - self.sigma
+        return 1.0 / self.flexibility - self.sigma
 
     @property
     def phi(self) -> NDArray[Any]:
         """Mass-normalised modes, (n, m)."""
-        return self.psi / np.sqrt(self.mu)
+        return self.psi / np.sqrt(self.flexibility)
 
 
 def undamped_modes(K: NDArray[Any], M: NDArray[Any]) -> UndampedModes:
@@ -52,15 +52,15 @@ def undamped_modes(K: NDArray[Any], M: NDArray[Any]) -> UndampedModes:
     """
     sigma = 0.0 if _definite(K) else SHIFT * float(np.max(np.abs(np.diag(K)) / np.diag(M).real, initial=0.0))
     try:
-        mu, psi = eigen.pencil(M, K + sigma * M if sigma else K)
+        found, psi = eigen.pencil(M, K + sigma * M if sigma else K)
     except np.linalg.LinAlgError:
         # K has eigenvalues well below zero: the plain problem, mass-normalised.
         values, phi = eigen.pencil(K, M)
         sigma = float(-2.0 * values[0] + SHIFT * np.abs(values).max()) or 1.0
-        mu = 1.0 / (values + sigma)
-        return UndampedModes(mu=mu, psi=phi * np.sqrt(mu), sigma=sigma)
-    mu, psi = mu[::-1], psi[:, ::-1]
-    return UndampedModes(mu=np.maximum(mu, LEAST * mu[0]), psi=np.ascontiguousarray(psi), sigma=sigma)
+        found = 1.0 / (values + sigma)
+        return UndampedModes(flexibility=found, psi=phi * np.sqrt(found), sigma=sigma)
+    found, psi = np.maximum(found[::-1], LEAST * found[-1]), np.ascontiguousarray(psi[:, ::-1])
+    return UndampedModes(flexibility=found, psi=psi, sigma=sigma)
 
 
 def _definite(K: NDArray[Any]) -> bool:

@@ -70,7 +70,7 @@ def linear_modes(balance: Balance, slopes: Complex, omega: float = 1.0) -> list[
     held = L.conj().T @ slopes @ L
     dashpots = C + (held - hermitian(held)) / (1j * omega)
     found = undamped_modes(plain(hermitian((K + held)[free])), plain(hermitian(M[free])))
-    shapes = np.zeros((M.shape[0], found.mu.size), np.complex128)
+    shapes = np.zeros((M.shape[0], found.flexibility.size), np.complex128)
     shapes[model.free] = found.phi
     drags = dashpots @ shapes
     lost = np.sum(shapes.conj() * drags, axis=0).real

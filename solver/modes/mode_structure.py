@@ -237,7 +237,7 @@ def _carried(K: Complex, M: Complex, free: Flags) -> tuple[Complex, Complex, Rea
     """Return modes b of Hermitian parts, M b, and ω²; coordinates without inertia stay at rest."""
     rows = np.ix_(free, free)
     found = undamped_modes(plain(hermitian(K[rows])), plain(hermitian(M[rows])))
-    modes = np.zeros((K.shape[0], found.mu.size), np.complex128)
+    modes = np.zeros((K.shape[0], found.flexibility.size), np.complex128)
     modes[free] = found.phi
     squares = np.maximum(np.abs(found.omega2), 1e-12 * np.abs(found.omega2).max(initial=1.0))
     return modes, M @ modes, squares

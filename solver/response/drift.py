@@ -305,7 +305,7 @@ def _followed(
     stiff = np.array(slider.stiffnesses)[:, None]
     travel = np.diff(x[:, along], prepend=x[:, along, -1:], axis=2) + ways[:, along, None] / SAMPLES
     force, friction = np.zeros((many, ports, SAMPLES)), np.zeros((many, len(along), SAMPLES))
-    slide(np.ascontiguousarray(stiff * travel), slider.mu * pressed, not slider.limits_apart, friction)
+    slide(np.ascontiguousarray(stiff * travel), slider.limit(pressed), not slider.limits_apart, friction)
     force[:, along] = friction
     if slider.normal_port is not None:
         force[:, slider.normal_port] = pressed - rest

@@ -60,14 +60,14 @@ class HeldContact:
     def limit(self, tau: Real) -> Real:
         """Return μN [N], (n,)."""
         load = self.found.load
-        return np.asarray(self.given.mu * (fourier.basis(tau, (load.size - 1) // 2) @ load))
+        return np.asarray(self.given.limit(fourier.basis(tau, (load.size - 1) // 2) @ load))
 
     def lost(self, moved: Real) -> float:
         """Return the most that motions of all ports up to `moved` [m] take of the room to the limit [N]."""
         away, given = moved[self.ports], self.given
         lost = given.size(given.pull(away[: len(given.ports)]))
         if given.normal_port is not None:
-            lost = lost + given.mu * given.normal_stiffness * away[-1]
+            lost = lost + given.limit_rise * away[-1]
         return float(lost)
 
 

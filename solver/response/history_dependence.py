@@ -277,7 +277,7 @@ def _most_lost(given: Slider, distance: float, slip: float, approach: float) -> 
     """Return the most that motion within a distance [J] takes of the room below the limit [N]."""
     lost = max(given.stiffnesses) * math.sqrt(2.0 * distance * slip)
     if given.normal_port is not None:
-        lost += given.mu * given.normal_stiffness * math.sqrt(2.0 * distance * approach)
+        lost += given.limit_rise * math.sqrt(2.0 * distance * approach)
     return lost
 
 
@@ -312,7 +312,7 @@ class _Fits:
         away = np.moveaxis(moved[:, :, contact.ports], 2, 0)
         given = contact.given
         if given.normal_port is not None:
-            limit = limit + given.mu * given.normal_stiffness * away[-1]
+            limit = limit + given.limit_rise * away[-1]
         change = given.pull(away[: len(given.ports)])
         between = _BETWEEN * np.abs(change).max(axis=(0, 1), initial=0.0)
         return not bool(np.any(given.size(forces + change) + between >= limit))
@@ -373,7 +373,7 @@ def _in_sliders(solution: Solution, model: LinearModel, sticking: tuple[HeldCont
             if slider in held:
                 continue
             load = fourier.basis(angles, (response.load.size - 1) // 2) @ response.load
-            squares = (slider.mu * np.maximum(load, 0.0)) ** 2
+            squares = slider.limit(np.maximum(load, 0.0)) ** 2
             if len(slider.ports) == 1:
                 along = contact.friction_at(np.array(response.motions), response.load, angles)
                 squares = np.minimum(squares, along[slider.ports[0]] ** 2)

@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, cast
 
 import numpy as np
 
@@ -35,7 +35,8 @@ from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import KT, MU, OMEGA
 from solver.contacts.kernels.stick_slip_events import AFTER_SLIP, LIFTING, SLIP, UNLOADED, largest
 from solver.contacts.kernels.system import Evaluation, System, by_reference, evaluation_by_value
-from solver.contacts.segments import Segments, Shares, segments_of
+from solver.contacts.laws.contact_parts import Slider
+from solver.contacts.pieces.line import Segments, Shares, line_left, segments_of
 from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Integer, Real
@@ -117,8 +118,11 @@ class ContactCycle:
 
     def segments(self, e: int) -> Segments:
         """Return what contact `e`, whose slider moves on a line, does over the period."""
-        row, slip = self.table[e], self.full(self.U[self.ports(e)[0]])
-        return segments_of(slip, self.normal_load(e), row[KT], row[MU])
+        return segments_of(self.slider(e), self.full(self.U[self.ports(e)[0]]), self.normal_load(e))
+
+    def slider(self, e: int) -> Slider:
+        """Return the slider of contact `e`, which rubs, at this λ."""
+        return cast(Slider, self.balance.scene.contacts[e].with_numbers(self.table[e]).friction)
 
 
 def friction_work(cycle: ContactCycle, e: int, changes: Sequence[Change]) -> tuple[float, Real]:
@@ -203,13 +207,14 @@ def slip_travel(cycle: ContactCycle, e: int, changes: Sequence[Change]) -> tuple
     """
     if not cycle.balance.scene.contacts[e].slides_on_a_line:
         return None
-    kt, mu, port = cycle.table[e, KT], cycle.table[e, MU], cycle.ports(e)[0]
+    slider, port = cycle.slider(e), cycle.ports(e)[0]
+    kt = slider.kt
     U, N = cycle.full(cycle.U[port]), cycle.normal_load(e)
     ends = _slip_ends(cycle.segments(e))
     e_tau = fourier.basis(ends.tau, cycle.top)
     xi, sign = ends.direction, ends.sign
     u, load = e_tau @ U, e_tau @ N
-    travel = float(sign @ (xi * kt * u - mu * load) / kt)
+    travel = float((sign * xi) @ line_left(xi, kt, u, slider.limit(load)))
     du_dtau, dN_dtau = e_tau @ fourier.derivative(U), e_tau @ fourier.derivative(N)
     moving = ends.moves & (dN_dtau != 0.0)
     slopes = np.zeros(len(changes))
@@ -217,8 +222,8 @@ def slip_travel(cycle: ContactCycle, e: int, changes: Sequence[Change]) -> tuple
         du = e_tau @ cycle.full(change.dU[port])
         dload = e_tau @ cycle.load_change(e, change)
         dtau = np.where(moving, -dload / np.where(moving, dN_dtau, 1.0), 0.0)
-        dkt, dmu = change.row[e, KT], change.row[e, MU]
-        dw = xi * (dkt * u + kt * (du + du_dtau * dtau)) - dmu * load - mu * (dload + dN_dtau * dtau)
+        dkt, dlimit = change.row[e, KT], change.row[e, MU] * load + slider.limit(dload + dN_dtau * dtau)
+        dw = xi * (dkt * u + kt * (du + du_dtau * dtau)) - dlimit
         slopes[j] = (float(sign @ dw) - travel * dkt) / kt
     return travel, slopes
 

@@ -242,7 +242,8 @@ def _mean_limits(means: WorstMean, look: tuple[Real, float]) -> Real:
     for i, (contact, found) in enumerate(zip(scene.contacts, responses, strict=True)):
         end = begin + len(found.motions)
         if contact.friction is not None and gains is not None:
-            most[i] = 2.0 * contact.friction.mu * abs(found.load[0]) * np.abs(gains[:, begin:end]).sum()
+            limit = contact.friction.limit(abs(float(found.load[0])))
+            most[i] = 2.0 * limit * np.abs(gains[:, begin:end]).sum()
         begin = end
     return most
 
@@ -333,4 +334,4 @@ class WorstMeanSlopes(Sensitivities):
         at = np.array([tau])
         N = float(fourier.basis(at, (load.size - 1) // 2)[0] @ load)
         dN = by @ fourier.basis(at, (by.shape[1] - 1) // 2)[0]
-        return np.asarray(self._slopes[:, held.number, MU] * N + held.given.mu * dN)
+        return np.asarray(self._slopes[:, held.number, MU] * N + held.given.limit(dN))

@@ -82,7 +82,7 @@ def _sticking(balance: Balance, stuck: Real) -> Flags:
             continue
         pressed = load.least - (0.0 if contact.normal_port is None else stuck[:, first + contact.normal_port])
         pulled = np.linalg.norm(stuck[:, [first + port for port in contact.RUBBING]], axis=1)
-        sticks[:, e] = pulled <= friction.mu * np.maximum(pressed, 0.0)
+        sticks[:, e] = pulled <= friction.limit(np.maximum(pressed, 0.0))
     return sticks
 
 
@@ -267,7 +267,7 @@ def _slip(balance: Balance, i: int, stuck: Real) -> _Said:
     friction, load = contact.friction, contact.load
     if friction is None or load is None or not contact.JENKINS:
         return f"law of {contact.name}", True, contact.evaluation
-    limit = friction.mu * max(load.least, 0.0)
+    limit = friction.limit(max(load.least, 0.0))
     carried = stuck[balance.system.first_port[i]]
     words = f"stuck, {contact.name} would carry up to {carried:.4g} N in the band; its limit is {limit:.4g} N"
     if carried <= limit:

@@ -14,7 +14,7 @@ from solver.contacts.kernels import columns
 from solver.contacts.kernels.coulomb.line_force import contact_force
 from solver.contacts.kernels.stick_slip_events import FAILED, SLIPPING, STUCK, piece_of
 from solver.contacts.laws.contact_law import AnyContact
-from solver.contacts.laws.contact_parts import LawQuantity, RestStiffness, Row
+from solver.contacts.laws.contact_parts import LawQuantity, RestStiffness, Row, Slider
 from solver.jit.fourier import Integer
 from solver.jit.lapack import fill_block
 from solver.jit.separate import apart
@@ -100,11 +100,12 @@ class SlidersContact(AnyContact):
         return tuple(self.limit * (2 * i + 1) / SLIDERS**2 for i in range(SLIDERS))
 
     def force_at(self, motions: Real, load: Real, tau: Real) -> Real:
-        from solver.contacts.segments import force_by_segments
+        from solver.contacts.pieces.line import force_by_segments
 
         del load
+        slider = Slider(kt=self.k / SLIDERS, mu=1.0)
         loads = [np.array([limit, 0.0, 0.0]) for limit in self.limits]
-        return sum(force_by_segments(motions[0], load, self.k / SLIDERS, 1.0, tau) for load in loads)
+        return sum(force_by_segments(slider, motions[0], load, tau) for load in loads)
 
     def rows(self) -> tuple[Row, ...]:
         return tuple(

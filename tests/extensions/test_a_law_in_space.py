@@ -20,7 +20,7 @@ from solver.contacts.kernels import columns
 from solver.contacts.kernels.coulomb.line_force import contact_force
 from solver.contacts.kernels.stick_slip_events import FAILED, SLIPPING, STUCK, piece_of
 from solver.contacts.laws.contact_law import AnyContact
-from solver.contacts.laws.contact_parts import Follows, LawQuantity, RestStiffness, Row
+from solver.contacts.laws.contact_parts import Follows, LawQuantity, RestStiffness, Row, Slider
 from solver.contacts.laws.law_registry import register, unregister
 from solver.contacts.pieces.line import friction_pieces, polynomial_pieces
 from solver.contacts.pieces.piece import ContactPart
@@ -118,8 +118,8 @@ class PadContact(AnyContact):
 
     def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
         del load
-        limit = np.array([self.limit, 0.0, 0.0])
-        grips = [ContactPart((a,), friction_pieces(motions[a], limit, self.k, 1.0)) for a in self.RUBBING]
+        slider, limit = Slider(kt=self.k, mu=1.0), np.array([self.limit, 0.0, 0.0])
+        grips = [ContactPart((a,), friction_pieces(slider, motions[a], limit)) for a in self.RUBBING]
         return (*grips, ContactPart((2,), polynomial_pieces(motions[2], (self.base,))))
 
 

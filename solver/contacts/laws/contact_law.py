@@ -29,8 +29,8 @@ from solver.contacts.laws.contact_parts import (
 from solver.errors import SettingError
 
 if TYPE_CHECKING:
+    from solver.contacts.pieces.line import Shares
     from solver.contacts.pieces.piece import ContactPart
-    from solver.contacts.segments import Shares
 
 
 _ALONG = {"between": TANGENT_1, "between_second": TANGENT_2, "normal_between": NORMAL}
@@ -217,7 +217,7 @@ class AnyContact(Element, InSpace):
 
     @property
     def slides_on_a_line(self) -> bool:
-        """Whether its slider has the events of `solver.contacts.segments`, so that its travel is known."""
+        """Whether its slider has the events of `solver.contacts.pieces.line`, so that its travel is known."""
         return False
 
     @property
@@ -359,6 +359,10 @@ class AnyContact(Element, InSpace):
         """
         del load, gone
         return None
+
+    def held_fast(self) -> Self:
+        """Return the contact as one that goes on sticking where it sticks, whatever is put on it."""
+        return self
 
     def least_load_slope(self, key: str) -> float:
         """Return the derivative of the least normal load of a given load by a parameter of its own."""

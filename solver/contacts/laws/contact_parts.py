@@ -6,12 +6,13 @@ import cmath
 import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, TypeVar
 
 import numpy as np
 
 from solver.contacts.fields import Real
 
+Number = TypeVar("Number", float, Real)
 _AROUND, _BOTH_WAYS = 20.0, 4.0  # times its value, how far a parameter is varied by hand
 
 
@@ -154,6 +155,15 @@ class Slider:
             for kt, port in zip(self.stiffnesses, self.ports, strict=True)
         )
 
+    def limit(self, load: Number) -> Number:
+        """Return its limit μN [N] for loads N, or the coefficients of one for those of the other."""
+        return self.mu * load
+
+    @property
+    def limit_rise(self) -> float:
+        """By how much the limit grows with the normal motion [N/m]."""
+        return self.limit(self.normal_stiffness)
+
     def pull(self, away: Real) -> Real:
         """Return the forces (directions, ...) [N] of its spring for motions `away` of its directions [m]."""
         return np.asarray([kt * each for kt, each in zip(self.stiffnesses, away, strict=True)])
@@ -220,6 +230,11 @@ class Row:
     states: Annotated[int, "How many states it has."] = 0
     damping: Annotated[float, "Its damping at rest [N s/m]."] = 0.0
     numbers: Annotated[tuple[float, ...], "Its parameters."] = field(default=())
+
+    @classmethod
+    def of_strength(cls, name: str, kt: float, limit: float) -> Row:
+        """Return the row of a spring whose slider gives way at a force [N], whatever presses it."""
+        return cls(name=name, kt=kt, mu=1.0, N0=limit)
 
 
 class ContactMotion(Enum):

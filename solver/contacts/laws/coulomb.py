@@ -18,7 +18,7 @@ class SlidesOnALine(FrictionContact):
 
     @property
     def slides_on_a_line(self) -> bool:
-        """Whether it has one slider with the events of `solver.contacts.segments`."""
+        """Whether it has one slider with the events of `solver.contacts.pieces.line`."""
         return True
 
     def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...] | None:
@@ -60,10 +60,10 @@ class Contact(SlidesOnALine):
 
     def motion_at(self, motions: Real, load: Real, force: Real, tau: Real) -> list[ContactMotion]:
         """Return what it does at every angle, by its segments."""
-        from solver.contacts.segments import motion_at, segments_of
+        from solver.contacts.pieces.line import motion_at, segments_of
 
         del force
-        return motion_at(segments_of(motions[0], load, self.kt, self.mu), tau)
+        return motion_at(segments_of(self.friction, motions[0], load), tau)
 
 
 LAW = Contact

@@ -12,8 +12,8 @@ from solver.contacts.laws.contact_parts import Follows, RestStiffness, Row, Slid
 from solver.contacts.laws.friction import FrictionContact
 
 if TYPE_CHECKING:
+    from solver.contacts.pieces.line import Shares
     from solver.contacts.pieces.piece import ContactPart
-    from solver.contacts.segments import Shares
 
 
 class SlidesInAPlane(FrictionContact):
@@ -77,29 +77,27 @@ class SlidesInAPlane(FrictionContact):
         """Return both components of the friction force [N] at the angles `tau`, (2, n)."""
         if self.limits_apart:
             return super().friction_at(motions, load, tau)
-        from solver.contacts.space_path import force_in_space, path_in_space
+        from solver.contacts.pieces.circle import force_in_space, path_in_space
 
-        return force_in_space(path_in_space(motions, load, *self.tangential, self.mu), tau)
+        return force_in_space(path_in_space(self.friction, motions, load), tau)
 
     def shares(self, motions: Real, load: Real) -> Shares | None:
         """Return the shares of the period in stick, slip and separation."""
         if self.limits_apart:
             return super().shares(motions, load)
-        from solver.contacts.space_path import path_in_space, shares_in_space
+        from solver.contacts.pieces.circle import path_in_space, shares_in_space
 
-        return shares_in_space(path_in_space(motions, load, *self.tangential, self.mu))
+        return shares_in_space(path_in_space(self.friction, motions, load))
 
     def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...] | None:
         """Return how it follows small perturbations of a motion."""
         if self.limits_apart:
             return super().perturbed(motions, load)
-        from solver.contacts.pieces.circle_piece import circle_pieces
+        from solver.contacts.pieces.circle import circle_pieces, path_in_space
         from solver.contacts.pieces.piece import ContactPart
-        from solver.contacts.space_path import path_in_space
 
-        kn = None if self.normal_port is None else self.stiffnesses[self.normal_port]
-        path = path_in_space(motions, load, *self.tangential, self.mu)
-        return (ContactPart(tuple(range(len(motions))), circle_pieces(path, kn)),)
+        path = path_in_space(self.friction, motions, load)
+        return (ContactPart(tuple(range(len(motions))), circle_pieces(path)),)
 
     def rows(self) -> tuple[Row, ...]:
         """Return its rows of the time march, one for each direction; the first has the normal force."""

@@ -31,10 +31,11 @@ from solver.contacts.laws.load_harmonics import (
 from solver.errors import SettingError
 
 if TYPE_CHECKING:
+    from solver.contacts.pieces.line import Shares
     from solver.contacts.pieces.piece import ContactPart
-    from solver.contacts.segments import Shares
 
 _LEAST_FRICTION = 0.1  # in a linear limit: what must stick does so with a load of reason
+_MOST_FRICTION = 100.0
 _VARIATION = "changes the variation of a normal load"
 
 
@@ -78,6 +79,8 @@ class FrictionContact(AnyContact):
     }
     HELD: ClassVar[tuple[RestStiffness, ...]] = (RestStiffness(columns.KT),)
     RUBBING: ClassVar[tuple[int, ...]] = (0,)
+    IN_THE_LIMIT: ClassVar[frozenset[str]] = frozenset({"mu", "N0"})
+    """Parameters of which a steady limit tells the product alone."""
 
     kt: Annotated[Positive, "Tangential contact stiffness [N/m]."]
     mu: Annotated[Friction, "Friction coefficient."]
@@ -294,7 +297,7 @@ class FrictionContact(AnyContact):
         for port in self.RUBBING:
             rest[port, port] = centre[port]
         if normal is not None:
-            rest[list(self.RUBBING), normal] = self.mu * centre[normal]
+            rest[list(self.RUBBING), normal] = self.friction.limit_rise
             centre[normal] *= 0.5
             rest[normal, normal] = centre[normal]
         return centre, rest
@@ -315,33 +318,31 @@ class FrictionContact(AnyContact):
 
     def friction_at(self, motions: Real, load: Real, tau: Real) -> Real:
         """Return the friction force along each direction [N] at the angles `tau`, by its segments."""
-        from solver.contacts.segments import force_by_segments
+        from solver.contacts.pieces.line import force_by_segments
 
-        slider = self.friction
-        pairs = zip(slider.ports, slider.stiffnesses, strict=True)
-        return np.array([force_by_segments(motions[port], load, kt, self.mu, tau) for port, kt in pairs])
+        return np.array([
+            force_by_segments(slider, motions[slider.ports[0]], load, tau) for slider in self.friction.limited
+        ])  # fmt: skip
 
     def shares(self, motions: Real, load: Real) -> Shares | None:
         """Return the shares of the period in stick, slip and separation, by its segments."""
-        from solver.contacts.segments import segments_of, shares_of
+        from solver.contacts.pieces.line import segments_of, shares_of
 
-        slider = self.friction
-        pairs = zip(slider.ports, slider.stiffnesses, strict=True)
-        return shares_of(*(segments_of(motions[port], load, kt, self.mu) for port, kt in pairs))
+        sliders = self.friction.limited
+        return shares_of(*(segments_of(slider, motions[slider.ports[0]], load) for slider in sliders))
 
     def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...] | None:
         """Return how it follows small perturbations of a motion: each direction by itself."""
         from solver.contacts.pieces.line import friction_pieces
         from solver.contacts.pieces.piece import ContactPart
 
-        slider, normal = self.friction, self.normal_port
-        behind, kn = ((), None) if normal is None else ((normal,), slider.normal_stiffness)
+        behind = () if self.normal_port is None else (self.normal_port,)
         return tuple(
             ContactPart(
-                (port, *behind),
-                friction_pieces(motions[port], load, kt, self.mu, kn=kn, presses=port == slider.ports[0]),
+                (port, *behind), friction_pieces(slider, motions[port], load, presses=port == self.RUBBING[0])
             )
-            for port, kt in zip(slider.ports, slider.stiffnesses, strict=True)
+            for slider in self.friction.limited
+            for port in slider.ports
         )
 
     def utilisation(self, forces: Real, load: Real) -> float:
@@ -350,7 +351,7 @@ class FrictionContact(AnyContact):
 
         n = forces.shape[1]
         tau = np.linspace(0.0, 2.0 * np.pi, max(360, 8 * n), endpoint=False)
-        limit = self.mu * (fourier.basis(tau, (load.size - 1) // 2) @ load)
+        limit = self.friction.limit(fourier.basis(tau, (load.size - 1) // 2) @ load)
         along = forces[list(self.RUBBING)] @ fourier.basis(tau, (n - 1) // 2).T
         carried = self.friction.size(along)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -385,6 +386,10 @@ class FrictionContact(AnyContact):
         if self.mu < _LEAST_FRICTION:
             changed["mu"] = _LEAST_FRICTION
         return changed
+
+    def held_fast(self) -> Self:
+        """Return the contact as one that goes on sticking where it sticks, whatever is put on it."""
+        return self.model_copy(update={"mu": _MOST_FRICTION})
 
     def least_load_slope(self, key: str) -> float:
         """Return the derivative of the least value of a given load by a parameter of its own."""

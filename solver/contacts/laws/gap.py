@@ -14,8 +14,8 @@ from solver.contacts.laws.contact_law import AnyContact
 from solver.contacts.laws.contact_parts import ContactMotion, Follows, LawQuantity, RestStiffness, Row
 
 if TYPE_CHECKING:
+    from solver.contacts.pieces.line import Shares
     from solver.contacts.pieces.piece import ContactPart
-    from solver.contacts.segments import Shares
 
 
 class GapSpring(AnyContact):
@@ -74,13 +74,11 @@ class GapSpring(AnyContact):
         return [ContactMotion.SEPARATION if each == 0.0 else ContactMotion.STICK for each in force]
 
     def shares(self, motions: Real, load: Real) -> Shares:
-        """Return the shares of the period: u − gap > 0 is the load of a contact that does not slide."""
-        from solver.contacts.segments import segments_of, shares_of
+        """Return the shares of the period: closed it sticks."""
+        from solver.contacts.pieces.line import closed_where, shares_of
 
         del load
-        opening = motions[0].copy()
-        opening[0] -= self.gap
-        return shares_of(segments_of(np.zeros(opening.size), opening, 1.0, 1.0))
+        return shares_of(closed_where(motions[0], self.gap))
 
     def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
         """Return how it follows small perturbations of a motion."""

@@ -41,7 +41,7 @@ class _Rule(NamedTuple):
     nodes: Real
     matrix: Real
     weights: Real
-    mu: Complex
+    eigenvalues: Complex
     right: Complex
     left: Complex
     end: Real
@@ -56,11 +56,11 @@ def _rule(stages: int) -> _Rule:
     share = w[:, None] * P[:, :stages] * (orders + 0.5)
     below = np.column_stack([-np.ones(stages), P[:, : stages - 1]])
     matrix = 0.5 * (P[:, 1:] - below) / (2.0 * orders + 1.0) @ share.T
-    mu, right = np.linalg.eig(matrix)
-    upper, left = mu.imag > 0.0, np.linalg.inv(right)
+    values, right = np.linalg.eig(matrix)
+    upper, left = values.imag > 0.0, np.linalg.inv(right)
     weights = 0.5 * w
     return _Rule(
-        0.5 * (x + 1.0), matrix, weights, mu[upper], right[:, upper], left[upper],
+        0.5 * (x + 1.0), matrix, weights, values[upper], right[:, upper], left[upper],
         np.linalg.solve(matrix.T, weights), share[:, -2:].T,
     )  # fmt: skip
 
@@ -124,9 +124,9 @@ class StructureStep:
         n = b * k
         self.h, self.outputs = h, blocks.outputs[ports]
         inputs = blocks.inputs[:, ports]
-        hmu = h * GAUSS.mu[:, None, None, None]
-        X = np.linalg.inv(np.eye(k) + hmu * blocks.damping + hmu**2 * blocks.stiffness)
-        XK = hmu * (X @ blocks.stiffness)
+        scaled = h * GAUSS.eigenvalues[:, None, None, None]
+        X = np.linalg.inv(np.eye(k) + scaled * blocks.damping + scaled**2 * blocks.stiffness)
+        XK = scaled * (X @ blocks.stiffness)
         by_rate, by_motion = _ONCE * _END[0], h * _ONCE * _END[1]
         one = np.eye(k)
         self._own = (
@@ -134,14 +134,14 @@ class StructureStep:
         )  # fmt: skip
         seen = np.ascontiguousarray(self.outputs.reshape(p, b, k).swapaxes(0, 1))
         now, still = ((seen @ each).swapaxes(1, 2).reshape(len(X), p, n) for each in (X, XK))
-        spread, hm = GAUSS.right * _ONCE, hmu[:, 0, 0]
+        spread, hm = GAUSS.right * _ONCE, scaled[:, 0, 0]
         self.free = (_twice(spread, -still).reshape(-1, n), _twice(spread, now).reshape(-1, n))
         joined = GAUSS.right[:, :, None] * hm[:, 0, None] * GAUSS.left
         self.follows = -_twice(np.moveaxis(joined, 1, -1), now @ inputs).swapaxes(1, 2)
         self.follows = self.follows.reshape(STAGES * p, STAGES * p)
         fed = (X @ inputs.reshape(b, k, p)).reshape(len(X), n, p)
         self._pushed = tuple(
-            -_twice((end * factor * GAUSS.mu * h)[None, :] * GAUSS.left.T, fed)
+            -_twice((end * factor * GAUSS.eigenvalues * h)[None, :] * GAUSS.left.T, fed)
             .transpose(1, 0, 2)
             .reshape(n, -1)
             for end, factor in ((_END[1], h), (_END[0], 1.0))

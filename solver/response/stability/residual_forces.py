@@ -32,9 +32,6 @@ from solver.scene.bodies.body import Load
 from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Sensitivities
 
-STICKS = (
-    100.0  # friction coefficient with which a contact that sticks goes on sticking, whatever is put on it
-)
 _FIRST, _LEAST, _MOST = 0.25, 1e-4, 60  # steps, as shares of the largest limit, and how many of them
 _INSTANTS = 360
 
@@ -132,8 +129,7 @@ class LeftForces:
         """Return a scene whose contacts stick whatever they carry, with the forces left in them as loads."""
         stuck = {i for i, _ in self.sliding}
         contacts = tuple(
-            contact.model_copy(update={"mu": STICKS}) if i in stuck else contact
-            for i, contact in enumerate(scene.contacts)
+            contact.held_fast() if i in stuck else contact for i, contact in enumerate(scene.contacts)
         )
         loads = tuple(
             Load(name=name, dof=dof, force=-float(forces[k]) * factor) for name, dof, k, factor in self.terms
@@ -163,7 +159,7 @@ class _Search:
         limits = []
         for i in stuck:
             given, load = scene.contacts[i].friction, solution.contacts[i].load
-            limits.append(0.0 if given is None else given.mu * float(np.abs(load).sum()))
+            limits.append(0.0 if given is None else given.limit(float(np.abs(load).sum())))
         self._scale = max(limits)
 
     def ends(self, which: int) -> tuple[float, float]:
@@ -259,7 +255,7 @@ class _Search:
             carried = np.array([response.forces[port] for port in given.ports])
             carried[:, 0] += [s for s, (j, _) in zip(forces, self._sliding, strict=True) if j == i]
             basis = fourier.basis(tau, (carried.shape[1] - 1) // 2)
-            limit = given.mu * (fourier.basis(tau, (response.load.size - 1) // 2) @ response.load)
+            limit = given.limit(fourier.basis(tau, (response.load.size - 1) // 2) @ response.load)
             if np.any(given.size(carried @ basis.T) > limit):
                 return False
         return True

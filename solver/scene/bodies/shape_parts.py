@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 from pydantic import TypeAdapter, ValidationError
 
 from solver.contacts.laws.contact_law import AnyContact
+from solver.contacts.laws.coulomb_3d import SpaceContact
 from solver.errors import SettingError
-from solver.scene.bodies.body_shapes import POINTS, AnyShape
+from solver.scene.bodies.body_shapes import POINTS, AnyShape, Shape
 from solver.scene.bodies.kinematics import placed_forms
 from solver.scene.bodies.paths import BODY_UNITS, body_parameter
 from solver.scene.scene_parameter import ActsOn, Form, SceneParameter, Slope, Term
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 _UNITS = {
     **dict.fromkeys(("angle", "curved_angle"), "rad"), **dict.fromkeys(("width", "length", "radius"), "m"),
-    "kt": "N/m", "kn": "N/m", "mu": "", "N0": "N", POINTS: "", **BODY_UNITS,
+    **{key: SpaceContact.PARAMETERS[key].unit for key in Shape.FACE}, POINTS: "", **BODY_UNITS,
 }  # fmt: skip
 
 

@@ -15,7 +15,8 @@ from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
 from solver.linear.structure_matrices import elements_of
 from stickslip.lab.proofs.exact.flow import FlowPiece
-from stickslip.lab.proofs.exact.piecewise import FREE, STICK, MemberState, Piecewise
+from stickslip.lab.proofs.exact.piecewise import MemberState, Piecewise
+from solver.contacts.pieces.line import FREE, STICK
 from solver.scene.scene_records import LumpedStructure
 
 _AT_ONCE = 1e-7  # rad: events this near each other may be one

@@ -10,7 +10,7 @@ import pytest
 
 import solver
 from solver.contacts.laws.coulomb_3d import SpaceContact
-from solver.contacts.space_path import force_in_space, path_in_space
+from solver.contacts.pieces.circle import force_in_space, path_in_space
 from solver.errors import SceneError
 from solver.jit import fourier
 
@@ -88,7 +88,7 @@ def test_force_over_time_has_the_coefficients_of_the_balance(moves: bool) -> Non
     contact, response = scene.contacts[0], found.contacts[0]
     assert isinstance(contact, SpaceContact)
     motions = np.array(response.motions)
-    path = path_in_space(motions, response.load, contact.kt, contact.stiffnesses[1], contact.mu)
+    path = path_in_space(contact.friction, motions, response.load)
     n = 40_000
     force = force_in_space(path, np.linspace(0.0, 2.0 * np.pi, n, endpoint=False))
     for here, kept in zip(force, response.forces, strict=False):

@@ -18,14 +18,14 @@ import numpy as np
 from solver.contacts.fields import NonNegative, Real
 from solver.contacts.kernels import columns
 from solver.contacts.laws.contact_law import AnyContact, RateContact
-from solver.contacts.laws.contact_parts import Follows, LawQuantity, Row
+from solver.contacts.laws.contact_parts import Follows, LawQuantity, Row, Slider
 from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.history.definition import HistoryLaw, LawParameter
 from solver.errors import SettingError
 
 if TYPE_CHECKING:
+    from solver.contacts.pieces.line import Shares
     from solver.contacts.pieces.piece import ContactPart
-    from solver.contacts.segments import Shares
 
 KT, C, LIMIT = range(3)
 
@@ -54,13 +54,18 @@ class ViscousContact(RateContact, FrictionContact):
     utilisation = AnyContact.utilisation
     keeps_together = AnyContact.keeps_together
 
+    @property
+    def slider(self) -> Slider:
+        """Its spring and slider, which follow u + (c/kt) u'."""
+        return super().friction
+
     def shares(self, motions: Real, load: Real) -> Shares | None:
         """Return the shares of the period in stick, slip and separation, at a frequency; else None."""
-        from solver.contacts.segments import segments_of, shares_of
+        from solver.contacts.pieces.line import segments_of, shares_of
 
         if not self._omega:
             return None
-        return shares_of(segments_of(self._felt(motions)[0], load, self.kt, self.mu))
+        return shares_of(segments_of(self.slider, self._felt(motions)[0], load))
 
     def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...] | None:
         """Return None: the stability is not computed."""
@@ -93,9 +98,9 @@ class ViscousContact(RateContact, FrictionContact):
         SettingError
             The frequency is not known (`at_frequency`).
         """
-        from solver.contacts.segments import force_by_segments
+        from solver.contacts.pieces.line import force_by_segments
 
-        return force_by_segments(self._felt(motions)[0], load, self.kt, self.mu, tau).reshape(1, -1)
+        return force_by_segments(self.slider, self._felt(motions)[0], load, tau).reshape(1, -1)
 
     def rows(self) -> tuple[Row, ...]:
         """Return its row of the time march, which follows `step` in its own steps.
@@ -110,7 +115,7 @@ class ViscousContact(RateContact, FrictionContact):
         if self.load.orders:
             wanted = "must be constant beside a dashpot in stick where it is marched in time"
             raise SettingError(f"{self.name}.N1", self.N1_value, wanted)
-        numbers = (self.kt, self.c, self.mu * self.N0)
+        numbers = (self.kt, self.c, self.slider.limit(self.N0))
         return (
             Row(
                 name=self.name, follows=Follows.HISTORY, kt=self.kt, history=ready(_in_steps()).number,

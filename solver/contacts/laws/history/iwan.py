@@ -131,8 +131,7 @@ class Sliders(HistoryContact):
     def rows(self) -> tuple[Row, ...]:
         """Return the rows of the time march: every slider by itself, with its own events."""
         return tuple(
-            Row(name=f"{self.name} ({i + 1})", kt=kt, mu=1.0, N0=limit)
-            for i, (kt, limit) in enumerate(self.sliders)
+            Row.of_strength(f"{self.name} ({i + 1})", kt, limit) for i, (kt, limit) in enumerate(self.sliders)
         )
 
 

@@ -26,7 +26,8 @@ from stickslip.lab.proofs.exact.flow import (
     taylor,
 )
 from stickslip.lab.proofs.exact.orbit import PERIOD, ROUNDING, Ended, Orbit, find, follow, grazed
-from stickslip.lab.proofs.exact.piecewise import STICK, MemberState, Mode, Piecewise
+from stickslip.lab.proofs.exact.piecewise import MemberState, Mode, Piecewise
+from solver.contacts.pieces.line import STICK
 from solver.response.solution import Solution, SolutionStatus
 from solver.response.stability.multipliers import Stability, growth_of, verdict_of
 from solver.scene.scene import Scene
@@ -195,7 +196,7 @@ def _friction(system: Piecewise, panels: Panels, i: int, highest: int) -> Contac
     member = system.members[i]
     slider, modes = member.slider, panels.modes
     load = panels.values(np.array([mode.loads[i] for mode in modes]))
-    limit = member.mu * np.maximum(load, 0.0)
+    limit = member.friction.limit(np.maximum(load, 0.0))
     whole = panels.values(np.array([mode.limits[slider] for mode in modes]))
     total = panels.values(np.array([mode.forces[slider] for mode in modes]))
     factor = member.factor

@@ -30,7 +30,8 @@ from solver.errors import SettingError
 from solver.jit.timer import clock
 from solver.response.contact_response import code_of
 from stickslip.lab.proofs.exact.exact_branch import ExactBranch, Orbits, Point
-from stickslip.lab.proofs.exact.piecewise import FREE, STICK, MemberState, Piecewise
+from stickslip.lab.proofs.exact.piecewise import MemberState, Piecewise
+from solver.contacts.pieces.line import FREE, STICK
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene

@@ -21,9 +21,7 @@ import numpy as np
 from solver.jit.fourier import Real
 from stickslip.lab.proofs.exact.piecewise import (
     AT_GAP,
-    FREE,
     LIFTS,
-    STICK,
     TO_CLOSE,
     TO_OPEN,
     TO_REST,
@@ -32,6 +30,7 @@ from stickslip.lab.proofs.exact.piecewise import (
     Mode,
     Piecewise,
 )
+from solver.contacts.pieces.line import FREE, STICK, line_left
 
 DEGREE = 22  # of a Taylor series over a step, in which the fastest motion turns by TURN
 TURN = 0.7
@@ -178,7 +177,7 @@ class Flow:
                 state = self._decided(state, [which])
             else:
                 state.sliders[which] = STICK
-                _at_limit(system, resets, which, direction * mode.limits[which])
+                _at_limit(system, resets, which, direction, mode.limits[which])
         elif what == AT_GAP:
             state.pressed[which] = not state.pressed[which]
         elif what == TO_OPEN:
@@ -210,9 +209,8 @@ class Flow:
         if system.rigid[slider]:
             state.sliders[slider] = 1 if rate >= 0.0 else -1
             return state if rate != 0.0 else self._decided(state, [slider])
-        _at_limit(system, resets, slider, np.zeros(system.nw))
-        member = system.members[which]
-        grows = abs(member.factor) * member.mu * float(mode.loads[which] @ (mode.A @ self.w))
+        _at_limit(system, resets, slider, 0, np.zeros(system.nw))
+        grows = system.members[which].weight * float(mode.loads[which] @ (mode.A @ self.w))
         slips = abs(system.kt[slider] * rate) > grows
         state.sliders[slider] = (1 if rate > 0.0 else -1) if slips else STICK
         return state
@@ -253,10 +251,10 @@ class Flow:
         return found
 
 
-def _at_limit(system: Piecewise, resets: Real, slider: int, force: Real) -> None:
-    """Reset the position of an elastic slider to where its spring carries the force of a row."""
-    at = system.elastic_at[slider]
-    resets[at] = system.motion(system.d[slider]) - force / system.kt[slider]
+def _at_limit(system: Piecewise, resets: Real, slider: int, direction: int, limit: Real) -> None:
+    """Reset the position of an elastic slider to where a slip leaves it, its limit a row."""
+    u = system.motion(system.d[slider])
+    resets[system.elastic_at[slider]] = line_left(direction, system.kt[slider], u, limit)
 
 
 def _orders(values: Real, noise: Real, series: Real) -> list[int]:

@@ -16,7 +16,8 @@ import numpy as np
 
 from solver.jit.fourier import Complex, Flags, Real
 from stickslip.lab.proofs.exact.flow import Flow, FlowPiece, LiftsError, NoMotionError
-from stickslip.lab.proofs.exact.piecewise import FREE, STICK, MemberState, Piecewise
+from stickslip.lab.proofs.exact.piecewise import MemberState, Piecewise
+from solver.contacts.pieces.line import FREE, STICK
 
 PERIOD = 2.0 * np.pi
 CLOSED = 1e-11  # distance after a period, of the largest number of the state, from which on it is polished

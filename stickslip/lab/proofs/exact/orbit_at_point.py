@@ -10,7 +10,8 @@ import numpy as np
 from solver.jit.fourier import Complex, Real
 from stickslip.lab.proofs.exact.flow import LiftsError, NoMotionError
 from stickslip.lab.proofs.exact.orbit import POLISH, Orbit, beside, find
-from stickslip.lab.proofs.exact.piecewise import FREE, STICK, MemberState, Piecewise
+from stickslip.lab.proofs.exact.piecewise import MemberState, Piecewise
+from solver.contacts.pieces.line import FREE, STICK
 from solver.response.solution import Solution
 from solver.response.time_history import all_coordinates
 
@@ -57,8 +58,8 @@ def begun_at(system: Piecewise, amplitudes: Complex, forces: Sequence[Real]) -> 
         state.closed[i] = load > 0.0
         state.sliders[member.slider] = STICK if load > 0.0 else FREE
         force = float(forces[member.contact][0])
-        held = np.clip(force, -member.mu * load, member.mu * load) if load > 0.0 else 0.0
-        w[system.elastic_at[member.slider]] = at - held / system.kt[member.slider]
+        limit = member.friction.limit(max(load, 0.0))
+        w[system.elastic_at[member.slider]] = at - min(max(force, -limit), limit) / system.kt[member.slider]
     for i, (_, row, _, gap) in enumerate(system.gaps):
         state.pressed[i] = row @ w[:n] > gap
     return w, state

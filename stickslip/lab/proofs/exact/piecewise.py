@@ -17,14 +17,14 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from solver.contacts.laws.contact_parts import Follows, NormalLoad, Row
+from solver.contacts.laws.contact_parts import Follows, NormalLoad, Row, Slider
+from solver.contacts.pieces.line import FREE, STICK, line_force, line_lasts
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Flags, Integer, Real
 from solver.linear.assembly import check_structure, linear_model
 from solver.linear.condensation import force_amplitudes
 from solver.scene.scene import Scene
 
-STICK, FREE = 0, 2  # of a slider; one that slips has its direction, +1 or -1
 TO_SLIP, TO_REST, TO_OPEN, TO_CLOSE, AT_GAP, LIFTS = range(6)  # what ends a piece
 _PARALLEL = 1e-12
 _ELASTIC = "give one a large finite kt (the error falls with its square root)"
@@ -38,13 +38,18 @@ class Member:
     contact: Annotated[int, "Its number in the scene."]
     slider: Annotated[int, "That of its slider."]
     factor: Annotated[float, "Its motion is that times the slider's."]
-    mu: Annotated[float, "Friction coefficient."]
+    friction: Annotated[Slider, "Its friction."]
     given: Annotated[Real, "(nw,) row of its load without what a rigid normal contact adds."]
     normal: Annotated[
         Real | None, "(n,) row of its normal motion, None under a given load; kn [N/m], may be infinite."
     ] = None
     kn: float = 0.0
     rest: Annotated[float, "Part of its normal force that is in equilibrium at rest [N]."] = 0.0
+
+    @property
+    def weight(self) -> float:
+        """How much of its load counts in the limit of its slider."""
+        return abs(self.factor) * self.friction.limit(1.0)
 
     @property
     def rigid_normal(self) -> bool:
@@ -156,7 +161,7 @@ class Piecewise:
 
     def _place(self, scene: Scene, ports: Real) -> None:
         """Sort the contacts into sliders with members, and springs on one side."""
-        raw: list[tuple[int, Real, Row, NormalLoad]] = []
+        raw: list[tuple[int, Slider, Real, Row, NormalLoad]] = []
         self.gaps: list[tuple[int, Real, float, float]] = []
         first = 0
         rows: list[Real] = []
@@ -164,9 +169,9 @@ class Piecewise:
         belongs: list[tuple[int, float]] = []
         for number, contact in enumerate(scene.contacts):
             row, numbers = ports[first], contact.rows()[0]
-            if contact.slides_on_a_line and contact.load is not None:
+            if contact.slides_on_a_line and contact.friction is not None and contact.load is not None:
                 own = ports[first : first + len(contact.end_keys)]
-                raw.append((number, own, numbers, contact.load))
+                raw.append((number, contact.friction, own, numbers, contact.load))
                 belongs.append(_slider_of(row, numbers.kt, rows, stiffnesses))
             elif numbers.follows is Follows.GAP:
                 self.gaps.append((number, row, numbers.kt, numbers.gap))
@@ -177,16 +182,20 @@ class Piecewise:
         self.d = np.array(rows).reshape(-1, self.n)
         self.kt = np.array(stiffnesses)
         self.rigid = np.isinf(self.kt)
-        self.members = [
-            self._member(*each, slider, factor) for each, (slider, factor) in zip(raw, belongs, strict=True)
-        ]
+        self.members = [self._member(place, *each) for place, each in zip(belongs, raw, strict=True)]
         self.of_slider = [
             [i for i, member in enumerate(self.members) if member.slider == slider]
             for slider in range(len(rows))
         ]
 
     def _member(
-        self, number: int, own: Real, numbers: Row, load: NormalLoad, slider: int, factor: float
+        self,
+        place: tuple[int, float],
+        number: int,
+        friction: Slider,
+        own: Real,
+        numbers: Row,
+        load: NormalLoad,
     ) -> Member:
         normal = None
         coefficients = load.coefficients[: 2 * self.top + 1]
@@ -200,7 +209,7 @@ class Piecewise:
             else:
                 given[: self.n] += numbers.kn * normal
         return Member(
-            contact=number, slider=slider, factor=factor, mu=numbers.mu, given=given, normal=normal,
+            contact=number, slider=place[0], factor=place[1], friction=friction, given=given, normal=normal,
             kn=numbers.kn, rest=numbers.rest,
         )  # fmt: skip
 
@@ -230,14 +239,12 @@ class Piecewise:
         loads = np.array([each.given for each in self.members]).reshape(-1, self.nw)
         limits = np.zeros((len(self.kt), self.nw))
         for i in np.flatnonzero(state.closed).tolist():
-            limits[self.members[i].slider] += self._weight(i) * loads[i]
+            limits[self.members[i].slider] += self.members[i].weight * loads[i]
         push, forces = self._pushed(state), np.zeros_like(limits)
         for i, xi in enumerate(state.sliders.tolist()):
-            if xi == STICK and not self.rigid[i]:
-                forces[i] = self.kt[i] * self.motion(self.d[i])
-                forces[i, self.elastic_at[i]] = -self.kt[i]
-            elif abs(xi) == 1:
-                forces[i] = xi * limits[i]
+            if xi != STICK or not self.rigid[i]:
+                held = np.eye(1, self.nw, self.elastic_at[i])[0]
+                forces[i] = line_force(xi, self.kt[i], self.motion(self.d[i]), held, limits[i])
             push -= np.outer(self.d[i], forces[i])
         held = [i for i, xi in enumerate(state.sliders.tolist()) if xi == STICK and self.rigid[i]]
         pressing = [i for i, each in enumerate(self.members) if each.rigid_normal]
@@ -245,7 +252,7 @@ class Piecewise:
         slip = {i: int(state.sliders[self.members[i].slider]) for i in pressing}
         slip = {i: xi if abs(xi) == 1 else 0 for i, xi in slip.items()}
         shares = [  # how a unit of each multiplier pulls: what is pressed also rubs
-            normal + slip[i] * self._weight(i) * self.d[self.members[i].slider]
+            normal + slip[i] * self.members[i].weight * self.d[self.members[i].slider]
             for i, normal in zip(pressing, normals, strict=True)
         ]
         B = np.array([*self.d[held], *normals]).reshape(-1, self.n)
@@ -255,15 +262,11 @@ class Piecewise:
         forces[held] = multipliers[: len(held)]
         for i, row in zip(pressing, multipliers[len(held) :], strict=True):
             loads[i] += row
-            limits[self.members[i].slider] += self._weight(i) * row
-            forces[self.members[i].slider] += slip[i] * self._weight(i) * row
+            limits[self.members[i].slider] += self.members[i].weight * row
+            forces[self.members[i].slider] += slip[i] * self.members[i].weight * row
         A = self._rates(push)
         conditions, ends = self._conditions(state, A, forces, limits, loads)
         return Mode(A, forces, limits, loads, conditions, ends, self._to_rates(B))
-
-    def _weight(self, i: int) -> float:
-        """Return how much of a member's load counts in the limit of its slider."""
-        return abs(self.members[i].factor) * self.members[i].mu
 
     def _pushed(self, state: MemberState) -> Real:
         """Return the forces on the coordinates without friction and multipliers, (n, nw)."""
@@ -304,13 +307,10 @@ class Piecewise:
         rows: list[Real] = []
         ends: list[tuple[int, int, int]] = []
         for i, xi in enumerate(state.sliders.tolist()):
-            if xi == STICK:
-                rows += [limits[i] - forces[i], limits[i] + forces[i]]
-                ends += [(TO_SLIP, i, 1), (TO_SLIP, i, -1)]
-            elif xi != FREE:
-                rate = self.motion(self.d[i], rate=True)
-                rows.append(xi * rate if self.rigid[i] else xi * self.kt[i] * rate - limits[i] @ A)
-                ends.append((TO_REST, i, xi))
+            rate = self.motion(self.d[i], rate=True)
+            lasts = line_lasts(xi, self.kt[i], forces[i], limits[i], rate, limits[i] @ A)
+            rows += lasts
+            ends += [(TO_SLIP, i, 1), (TO_SLIP, i, -1)] if xi == STICK else [(TO_REST, i, xi)] * len(lasts)
         for i, member in enumerate(self.members):
             if np.any(loads[i, : self.nd]) or np.any(loads[i, self.nd + 1 :]):
                 rows.append(loads[i] if state.closed[i] else -loads[i])

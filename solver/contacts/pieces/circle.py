@@ -1,4 +1,8 @@
-"""States of friction in two directions under one circular limit L = μN, linearised about the motion.
+"""Friction in two directions under one circular limit L = μN between two events, and linearised about it.
+
+From the sticks and slips with their exact ends that `solver.contacts.kernels.circle.circle_state` finds: the
+force of a stick is that at its begin and the motion since then; in a slip it lies on the circle, in the
+direction of the collocation polynomial.
 
 Stick: t = K (u − w), K = diag(k1, k2). In slip t = L n, n = (cos θ, sin θ), m = (−sin θ, cos θ), and with
 F = K⁻¹, Δ = 1/k2 − 1/k1, G = mᵀ F m
@@ -18,18 +22,122 @@ slider is at rest, δw = δu − F δt; where a contact closes into stick, w = u
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from solver.contacts.fields import Real
-from solver.contacts.kernels.stick_slip_events import SLIP
+from solver.contacts.kernels.circle.circle_law import whole_path
+from solver.contacts.kernels.circle.circle_state import FOUND, SETTLES
+from solver.contacts.kernels.circle.panels import between
+from solver.contacts.kernels.columns import COLUMNS, KT, KT_SECOND, MU
+from solver.contacts.kernels.stick_slip_events import FAILED, SEPARATED, SLIP
+from solver.contacts.laws.contact_parts import Slider
+from solver.contacts.pieces.line import Shares, gap_pieces
 from solver.contacts.pieces.piece import SHORTEST, TURN, Rates, StateEntry, StatePiece, spring, steady
-from solver.contacts.space_path import SpacePath, directions
+from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.kernel_records import Row
+from solver.jit.trig_polynomial import grid_size, grid_tables
 
 _TOGETHER = 1e-8  # rad: two states no further apart follow each other
 _LEAST = 1e-300
+
+
+class SpacePath(NamedTuple):
+    """The sticks and slips of a period, with the motions and the load they belong to."""
+
+    motions: Real  # (2, 2H + 1) [m]
+    load: Real  # full coefficients, not cut at 0 [N]
+    slider: Slider
+    pieces: np.recarray[Any, Any]
+    panels: np.recarray[Any, Any]
+    settles: bool  # it slips no more: the last piece lasts for ever
+    contact: float  # share of the period in which the normal load presses
+
+
+def path_in_space(slider: Slider, motions: Real, load: Real) -> SpacePath:
+    """Follow a contact over a period.
+
+    Parameters
+    ----------
+    motions : (2 or 3, 2H + 1) full coefficients [m], of which the first two are tangential.
+    load : full coefficients of the normal load, what the normal motion adds included [N].
+
+    Raises
+    ------
+    SettingError
+        A motion that can not be followed.
+    """
+    sliding = np.ascontiguousarray(motions[:2])
+    ks, load_ks = (fourier.all_harmonics((q.shape[-1] - 1) // 2) for q in (sliding, load))
+    top = max(int(ks[-1]), int(load_ks[-1]), 1)
+    row = np.zeros(COLUMNS)
+    row[[KT, KT_SECOND, MU]] = *slider.stiffnesses, slider.mu
+    tables = grid_tables(grid_size(top), top)
+    found, intervals = np.zeros(1, FOUND), np.empty((top + 2, 2))
+    state, pieces, panels = whole_path(sliding, ks, load, load_ks, row, *tables, found, intervals)
+    if state < 0 or state == FAILED:
+        raise SettingError("motions", "of this contact", "must be ones that can be followed")
+    (here,) = found.view(np.recarray)
+    count = 0 if state == SEPARATED else here.pieces
+    pressed = intervals[: here.intervals]
+    share = float((pressed[:, 1] - pressed[:, 0]).sum()) / TURN if len(pressed) else 1.0
+    return SpacePath(
+        motions=sliding, load=load, slider=slider, pieces=pieces[:count].copy().view(np.recarray),
+        panels=panels.view(np.recarray), settles=bool(here.how == SETTLES),
+        contact=0.0 if state == SEPARATED else share,
+    )  # fmt: skip
+
+
+def shares_in_space(path: SpacePath) -> Shares:
+    """Return the shares of the period in stick, slip and separation."""
+    if path.settles or not len(path.pieces):
+        return Shares(stick=path.contact, slip=0.0, separation=1.0 - path.contact)
+    slips = path.pieces[path.pieces.motion == SLIP]
+    slip = float((slips.end - slips.begin).sum()) / TURN
+    return Shares(stick=max(path.contact - slip, 0.0), slip=slip, separation=1.0 - path.contact)
+
+
+def force_in_space(path: SpacePath, tau: Real) -> Real:
+    """Return both components of the friction force [N] at the angles `tau` [rad], (2, n)."""
+    force = np.zeros((2, tau.size))
+    pieces = path.pieces[-1:] if path.settles else path.pieces
+    for piece in pieces:
+        since = (tau - piece.begin) % TURN
+        inside = np.full(tau.size, True) if path.settles else since <= piece.end - piece.begin
+        here = piece.begin + since[inside]
+        force[:, inside] = (_slipping if piece.motion == SLIP else _sticking)(path, piece, here)
+    return force
+
+
+def _sticking(path: SpacePath, piece: Row, tau: Real) -> Real:
+    begin = np.array([piece.begin])
+    moved = _at(path.motions, tau) - _at(path.motions, begin)
+    return np.asarray(np.array([[piece.tx], [piece.ty]]) + path.slider.pull(moved))
+
+
+def _slipping(path: SpacePath, piece: Row, tau: Real) -> Real:
+    angles = directions(path, piece, tau)
+    limit = path.slider.limit(_at(path.load[None], tau)[0])
+    return np.asarray(limit * np.array([np.cos(angles), np.sin(angles)]))
+
+
+def directions(path: SpacePath, piece: Row, tau: Real) -> Real:
+    """Return the direction θ of the force at angles within a slip, (n,) [rad]."""
+    panels = path.panels[piece.first : piece.first + piece.count].view(np.recarray)
+    found = np.empty(tau.size)
+    for i, (at, panel) in enumerate(
+        zip(tau, panels[np.clip(np.searchsorted(panels.end, tau), 0, len(panels) - 1)], strict=True)
+    ):
+        place = min(max((at - panel.begin) / (panel.end - panel.begin), 0.0), 1.0)
+        found[i] = between(panel.start, np.ascontiguousarray(panel.theta), place)
+    return found
+
+
+def _at(coefficients: Real, tau: Real) -> Real:
+    """Return the values of rows of full coefficients at the angles `tau`, (rows, n)."""
+    return np.asarray(coefficients @ fourier.basis(tau, (coefficients.shape[1] - 1) // 2).T)
 
 
 class _Motion:
@@ -40,8 +148,8 @@ class _Motion:
         highest = max((path.motions.shape[1] - 1) // 2, (path.load.size - 1) // 2)
         curves = np.zeros((4, 2 * highest + 1))
         curves[:2, : path.motions.shape[1]] = fourier.derivative(path.motions)
-        curves[2, : path.load.size] = path.mu * path.load
-        curves[3, : path.load.size] = path.mu * fourier.derivative(path.load)
+        curves[2, : path.load.size] = path.slider.limit(path.load)
+        curves[3, : path.load.size] = path.slider.limit(fourier.derivative(path.load))
         self._curves, self._highest = curves, highest
 
     def at(self, tau: Real) -> tuple[Real, Real, Real]:
@@ -57,9 +165,10 @@ class _Motion:
         return directions(self.path, piece, np.where(later, piece.begin, here))
 
 
-def circle_pieces(path: SpacePath, kn: float | None) -> tuple[StatePiece, ...]:
+def circle_pieces(path: SpacePath) -> tuple[StatePiece, ...]:
     """Return the states of a contact in space with two or, where the load moves, three motions."""
-    if path.mu == 0.0 or not len(path.pieces):
+    kn = None if path.slider.normal_port is None else path.slider.normal_stiffness
+    if not path.slider.limit(1.0) or not len(path.pieces):
         return _without_friction(path, kn)
     motion = _Motion(path)
     if path.settles:
@@ -81,8 +190,6 @@ def circle_pieces(path: SpacePath, kn: float | None) -> tuple[StatePiece, ...]:
 
 def _without_friction(path: SpacePath, kn: float | None) -> tuple[StatePiece, ...]:
     """Return when the normal load alone acts."""
-    from solver.contacts.pieces.line import gap_pieces
-
     if kn is None:
         return ()
     tangent = np.diag([0.0, 0.0, kn])
@@ -107,7 +214,7 @@ def _tangent(block: Real, kn: float | None, column: Real) -> Real:
 def _stick(
     path: SpacePath, kn: float | None, begin: float, end: float, entry: StateEntry | None
 ) -> StatePiece:
-    K = np.diag(path.kt)
+    K = np.diag(path.slider.stiffnesses)
     grip = -K if kn is None else np.vstack([-K, np.zeros(2)])
     carried = _padded(np.eye(2), kn)
     rates = steady(_tangent(K, kn, np.zeros(2)), grip)
@@ -117,7 +224,7 @@ def _stick(
 def _entry(motion: _Motion, kn: float | None, row: Row, before: Row | None) -> StateEntry:
     """Return what is remembered where a state begins, after another or after separation."""
     path, begin = motion.path, float(row.begin)
-    K, by_load = np.diag(path.kt), path.mu * (kn or 0.0)
+    K, by_load = np.diag(path.slider.stiffnesses), path.slider.limit_rise
     m = 2 if kn is None else 3
     rate, limit_rate = motion.at(np.array([begin]))[::2]
     slips = row.motion == SLIP
@@ -135,12 +242,10 @@ def _entry(motion: _Motion, kn: float | None, row: Row, before: Row | None) -> S
     )
     if slips:
         along = float(m_way @ K @ n) / float(n @ K @ n)
-        onto = (m_way - along * n) / path.kt[0]
-        return StateEntry(
-            _padded((onto @ K)[None, :], kn, np.array([along * by_load / path.kt[0]])), -(onto @ K)[None, :]
-        )
+        onto = (m_way - along * n)[None, :] @ K / path.slider.kt
+        return StateEntry(_padded(onto, kn, np.array([along * by_load / path.slider.kt])), -onto)
     F = np.linalg.inv(K)
-    return StateEntry(_padded(np.eye(2), kn, -F @ n * by_load), -path.kt[0] * (F @ m_way)[:, None])
+    return StateEntry(_padded(np.eye(2), kn, -F @ n * by_load), -path.slider.kt * (F @ m_way)[:, None])
 
 
 def _ways(theta: float | Real) -> tuple[Real, Real]:
@@ -162,7 +267,7 @@ def _slip(motion: _Motion, kn: float | None, row: Row, entry: StateEntry) -> Sta
 
 def _slip_rates(motion: _Motion, kn: float | None, row: Row) -> Callable[[Real], Rates]:
     """Return the rates in a slip as a function of angles."""
-    (k1, k2), by_load = motion.path.kt, motion.path.mu * (kn or 0.0)
+    (k1, k2), by_load = motion.path.slider.stiffnesses, motion.path.slider.limit_rise
     more = 1.0 / k2 - 1.0 / k1
 
     def rates(tau: Real) -> Rates:
