@@ -19,10 +19,9 @@ from scipy.sparse import csr_array, diags_array
 from solver.errors import SettingError
 from solver.jit.timer import clock
 from solver.lab import from_lab
-from solver.marching.contacts import as_sparse, rows
 from solver.marching.kernels import march_state as kernel
 from solver.marching.kernels import taylor as stepping
-from solver.marching.march_equations import MarchEquations, equations_of_motion
+from solver.marching.march_equations import MarchEquations, as_sparse, equations_of_motion, rows
 from solver.marching.march_result import MarchResult, MarchStatus, describe, of_harmonic
 from solver.marching.march_start import MarchStart, state_at
 from solver.results.watch import shows_progress

@@ -1,33 +1,108 @@
 """The equations of motion of a scene as the time march reads them: sparse rows in the angle tau = omega t.
 
 They share nothing with the harmonic balance: matrices are inverted here, not decomposed.
+
+In the modes of the structure full matrices become diagonal ones: x = V q with Vᵀ M V = 1 makes of
+x'' = W (f − Lᵀ F) − A x − B x' the rows q'' = Vᵀ f − (L V)ᵀ F − Λ q − D q'. A force acts on all modes: its
+DOF stays as a coordinate that never moves, whose pull goes to the modes. What is observed is a sum of modes,
+one more coordinate.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Annotated
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 from scipy.sparse import block_diag, csr_array, diags_array, vstack
 
+from solver.arrays import Real
+from solver.contacts.laws.contact_law import AnyContact
+from solver.contacts.laws.contact_parts import Row
 from solver.errors import SettingError
-from solver.marching.contacts import columns, selection, sparse_rows
 from solver.marching.kernels import march_state as kernel
+from solver.marching.kernels.march_state import SparseRows, System, steady
 from solver.marching.march_base import with_base, with_sum
 from solver.scene.bodies.body import REVOLUTIONS, Body
-from solver.scene.bodies.kinematics import dof_names, pair_form
+from solver.scene.bodies.kinematics import Form, dof_names, pair_form
 from solver.scene.linear_terms import End, dofs_at
 from solver.scene.scene import LumpedStructure, MatricesStructure, Scene
 
-FloatArray = NDArray[np.float64]
+
+def rows(contacts: tuple[AnyContact, ...]) -> tuple[Row, ...]:
+    """Return the rows of all contacts; a square limit in two directions is two of them.
+
+    Raises
+    ------
+    SettingError
+        A contact has a law that the march does not follow, such as a circular limit.
+    """
+    return tuple(row for contact in contacts for row in contact.rows())
+
+
+def columns(placed: Sequence[tuple[Row, tuple[Form, ...]]], index: dict[str, int], n: int) -> dict[str, Any]:
+    """Return the arrays of `solver.marching.kernels.march_state.System` that belong to the contacts.
+
+    Parameters
+    ----------
+    placed : every row, and the relative motions of its contact.
+    index : the coordinate of each DOF in use; n : how many coordinates there are.
+    """
+    found = [row for row, _ in placed]
+    L = selection([own[row.port] for row, own in placed], index, n)
+    normal = [() if row.normal_port is None else own[row.normal_port] for row, own in placed]
+    loads = [np.array([(row.N1, row.N1_phase), *row.higher]).T for row in found]
+    waves, phases = (_table([load[which] for load in loads], least=1) for which in range(2))
+    scalars = ("kt", "mu", "N0", "kn", "rest", "presses", "gap", "damping")
+    whole = ("history", "in_steps", "states")
+    counts = {name: np.array([getattr(row, name) for row in found], dtype=np.int64) for name in whole}
+    numbers = {name: np.array([getattr(row, name) for row in found], dtype=np.float64) for name in scalars}
+    laws = np.array([row.follows.value for row in found], dtype=np.int64)
+    motions = {"L": sparse_rows(L), "normal": sparse_rows(selection(normal, index, n))}
+    swings = {"waves": waves, "wave_phases": phases, **steady(waves)}
+    tables = {
+        "powers": _table([row.powers for row in found], least=1),
+        "numbers": _table([row.numbers for row in found]),
+    }
+    return {**numbers, **counts, **motions, **swings, "law": laws, **tables}
+
+
+def _table(given: Sequence[Sequence[float]], *, least: int = 0) -> Real:
+    """Return rows of several lengths as one array, 0 behind the shorter ones."""
+    table = np.zeros((len(given), max([least, *map(len, given)])))
+    for row, numbers in zip(table, given, strict=True):
+        row[: len(numbers)] = numbers
+    return table
+
+
+def limit_of(system: System, load: Real) -> Real:
+    """Return the limit of each row's friction for its load [N]."""
+    return np.asarray(system.mu * load)
+
+
+def selection(forms: Sequence[Form], index: dict[str, int], n: int) -> csr_array:
+    """Return relative motions as rows over the coordinates."""
+    terms = [(row, index[t.dof], t.factor) for row, form in enumerate(forms) for t in form]
+    row, column, factor = np.array(terms, dtype=float).reshape(-1, 3).T
+    return csr_array((factor, (row.astype(np.int64), column.astype(np.int64))), shape=(len(forms), n))
+
+
+def sparse_rows(matrix: csr_array) -> SparseRows:
+    """Return a matrix as the kernels read it."""
+    return SparseRows(matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64), matrix.data)
+
+
+def as_sparse(rows: SparseRows, n: int) -> csr_array:
+    """Return it again, with n columns."""
+    return csr_array((rows.value, rows.column, rows.start), shape=(rows.start.size - 1, n))
+
+
 _INDEPENDENT = 1e-9  # smallest singular value of the modes at the DOFs in use, relative to the largest
 
 
-Equations = tuple[FloatArray, FloatArray, FloatArray, dict[str, int]]
+Equations = tuple[Real, Real, Real, dict[str, int]]
 """M⁻¹ K [1/s²], M⁻¹ C [1/s] and M⁻¹ [1/kg], (n, n) each, and the coordinate of each DOF in use."""
 
 
@@ -63,14 +138,14 @@ def _of_structure(structure: MatricesStructure, used: Sequence[str], spin: float
     return W @ K, W @ C, W, {name: rows[name] for name in used}
 
 
-def _modal_damping_root(scaled: FloatArray, ratios: float | Sequence[float]) -> FloatArray:
+def _modal_damping_root(scaled: Real, ratios: float | Sequence[float]) -> Real:
     """Twice the square root of a stiffness where M is 1, each mode with its damping ratio."""
     values, vectors = linalg.eigh(scaled)
     zeta = _ratio_of_each(ratios, values.size)
     return np.asarray((vectors * (2.0 * zeta * np.sqrt(np.maximum(values, 0.0)))) @ vectors.T)
 
 
-def _ratio_of_each(ratios: float | Sequence[float], count: int) -> FloatArray:
+def _ratio_of_each(ratios: float | Sequence[float], count: int) -> Real:
     """The damping ratio of each of `count` modes: the last one given also of those above it."""
     given = np.atleast_1d(np.array(ratios, dtype=np.float64))
     return np.concatenate([given, np.full(max(count - given.size, 0), given[-1])])[:count]
@@ -114,17 +189,13 @@ class MarchEquations:
     ]
     index: Annotated[dict[str, int], "Coordinate of each DOF."]
     seen: Annotated[tuple[tuple[int, float], ...], "Coordinates that `observed` adds up, with their factors."]
-    modes: Annotated[FloatArray | None, "Motion of the DOFs in each, (n, n), where they are coordinates."] = (
-        None
-    )
+    modes: Annotated[Real | None, "Motion of the DOFs in each, (n, n), where they are coordinates."] = None
 
 
 _IN_TIME = "cannot be marched in time: it is a term of the frequency domain; give dashpots or damping ratios"
 
 
-def _matrices(
-    structure: LumpedStructure, bodies: tuple[Body, ...]
-) -> tuple[FloatArray, csr_array, csr_array]:
+def _matrices(structure: LumpedStructure, bodies: tuple[Body, ...]) -> tuple[Real, csr_array, csr_array]:
     """Masses [kg] of the points, and damping and stiffness of a lumped structure with bodies."""
     M = np.array([mass.m for mass in structure.masses])
     k = np.array([spring.k for spring in structure.springs])
@@ -224,7 +295,7 @@ def _row_at(end: End, index: dict[str, int], size: int) -> csr_array:
 
 
 def _with_points(
-    scene: Scene, A: csr_array, B: csr_array, W: csr_array, K: FloatArray, C: FloatArray
+    scene: Scene, A: csr_array, B: csr_array, W: csr_array, K: Real, C: Real
 ) -> tuple[csr_array, csr_array, csr_array]:
     """The same with rows of the points without inertia, for which C x' + K x = 0.
 
@@ -289,3 +360,55 @@ def equations_of_motion(scene: Scene, omega: float, *, swept: bool = False) -> M
         **columns(placed, index, A.shape[0]),
     )
     return MarchEquations(system, observed, index, seen)
+
+
+_FEWEST = 6  # coordinates; below, full matrices cost no more
+_ROUNDING = 1e-10  # relative: of what is to be symmetric or diagonal
+
+
+def in_modes(equations: MarchEquations) -> MarchEquations:
+    """Return the equations in modes; as they are where they are few, sparse, or modes do not part them."""
+    system = equations.system
+    n = system.A.start.size - 1
+    if n < _FEWEST or 2 * system.A.value.size < n * n or system.A_course.size:
+        return equations
+    A, B, W, L, normal = (
+        as_sparse(each, n).toarray() for each in (system.A, system.B, system.W, system.L, system.normal)
+    )
+    if not _is_small(W - W.T, W) or linalg.eigvalsh(W)[0] <= 0.0:
+        return equations
+    mass = linalg.inv(W)
+    stiffness = mass @ A
+    if not _is_small(stiffness - stiffness.T, stiffness):
+        return equations
+    squares, V = linalg.eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
+    damping = V.T @ mass @ B @ V
+    own = np.diag(damping)
+    if not _is_small(damping - np.diag(own), damping):
+        return equations
+    pushed, places = np.unique(system.force_dof, return_inverse=True)
+    still = np.zeros(pushed.size)
+    spread = np.block([[np.eye(n), V[pushed].T], [np.zeros((pushed.size, n + pushed.size))]])
+    seen = tuple((m, float(factor)) for m, factor in enumerate(V[equations.observed]))
+    sparse = (csr_array(each) for each in (np.diag([*squares, *still]), np.diag([*own, *still]), spread))
+    *moved, observed = with_sum(seen, *sparse)
+    to, drive, inverse = (sparse_rows(each) for each in moved)
+    wider = csr_array(np.pad(L @ V, ((0, 0), (0, pushed.size + 1))))
+    pressing = csr_array(np.pad(normal @ V, ((0, 0), (0, pushed.size + 1))))
+    changed = system._replace(
+        A=to, B=drive, W=inverse, L=sparse_rows(wider), normal=sparse_rows(pressing), force_dof=n + places,
+    )  # fmt: skip
+    return replace(equations, system=changed, observed=observed, index={}, seen=seen, modes=V)
+
+
+def moved_to(state: kernel.State, before: MarchEquations, now: MarchEquations) -> None:
+    """Give a state of equations in modes the coordinates of others of the same scene."""
+    if before.modes is None or now.modes is None:
+        return
+    n = len(now.modes)
+    for vector in (state.x, state.v):
+        vector[:n] = linalg.solve(now.modes, before.modes @ vector[:n])
+
+
+def _is_small(rest: Real, whole: Real) -> bool:
+    return bool(np.abs(rest).max() <= _ROUNDING * np.abs(whole).max())

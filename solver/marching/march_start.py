@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from solver.errors import SettingError
-from solver.marching.contacts import limit_of
 from solver.marching.kernels import march_state as kernel
-from solver.marching.march_equations import MarchEquations
+from solver.marching.march_equations import MarchEquations, limit_of
 from solver.wording import listing
 
 _FRICTION = (kernel.COULOMB, kernel.ELASTIC_NORMAL, kernel.CIRCLE, kernel.CIRCLE_SECOND)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from solver.errors import SettingError
-from solver.marching.contacts import rows
+from solver.marching.march_equations import rows
 from solver.marching.march_start import MarchStart
 from solver.response.solution import Solution
 from solver.response.time_history import motion

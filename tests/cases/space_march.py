@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from solver.contacts.laws.contact_parts import Follows, Row
-from solver.marching.contacts import columns
 from solver.marching.kernels import march_state as kernel
 from solver.marching.kernels.taylor import run_periods
+from solver.marching.march_equations import columns
 from solver.scene.scene_parameter import Term
 
 DATA = json.loads((Path(__file__).parent.parent / "data" / "three_d.json").read_text())

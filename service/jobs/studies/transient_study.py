@@ -17,7 +17,7 @@ from service.jobs.study import Study
 from solver.errors import Issue, SettingError
 
 if TYPE_CHECKING:
-    from solver.marching.ramp import Ramp
+    from solver.marching.transient import Ramp
     from solver.scene.scene import Scene
 
 _Rates = Annotated[list[PositiveNumber], Field(min_length=1, max_length=50)]
@@ -31,7 +31,7 @@ class Transient(Study):
 
     EXAMPLES = ({"scene": "two-dof", "begin_hz": 0.5, "end_hz": 1.6, "rate_hz_per_s": 0.01},)
     NAME, FUNCTION = "transient", "solver:transient"
-    RESULT = answered("solver.marching.transient_result:TransientResult", "TransientResult")
+    RESULT = answered("solver.marching.march_result:TransientResult", "TransientResult")
     TOLD = "solver.views.tables.responses:transient"
     SHOWS, COUNTED = "the largest amplitude of a run ([transients](transients.md))", "turns"
     FIGURE, EMPTY = "solver.views.plots.motion:transient_figure", ("time", "nothing was run through")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.errors import SettingError
-from solver.marching.contacts import as_sparse
+from solver.marching.march_equations import as_sparse
 from solver.marching.march_equations import MarchEquations
 from stickslip.lab.proofs.kernels import moreau_steps as stepping
 from solver.marching.kernels import march_state as kernel

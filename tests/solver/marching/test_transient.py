@@ -13,9 +13,8 @@ from scipy.special import wofz
 
 import solver
 from solver.errors import SettingError
-from solver.marching.march_equations import equations_of_motion
-from solver.marching.march_modal import in_modes
-from solver.marching.transient_result import TransientStatus
+from solver.marching.march_equations import equations_of_motion, in_modes
+from solver.marching.march_result import TransientStatus
 from solver.scene.scene import Scene
 
 K = (2.0 * math.pi) ** 2  # of a mass of 1 kg: 1 Hz
