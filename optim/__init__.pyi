@@ -1,4 +1,4 @@
-from .errors import DataError as DataError, DesignError as DesignError
+from .problem.checks import DataError as DataError, DesignError as DesignError
 from .identification.identify import identify as identify
 from stickslip.lab.posterior.model_choice import (
     ChoiceStatus as ChoiceStatus,
@@ -22,9 +22,10 @@ from .identification.identification_result import (
     Identification as Identification,
     IdentifyStatus as IdentifyStatus,
 )
-from .problem.typed import Case as Case, Limit as Limit
+from .problem.cases import Case as Case
+from .problem.design_problem import Limit as Limit
 from .results.design_result import DesignResult as DesignResult, DesignStatus as DesignStatus
-from .results.design_parts import CatalogueOption as CatalogueOption, OptionStatus as OptionStatus
+from .results.design_result import CatalogueOption as CatalogueOption, OptionStatus as OptionStatus
 from .robust.robust_result import RobustResult as RobustResult, RobustStatus as RobustStatus
 from .robust.robust_design import robust_design as robust_design
 from .search import design as design

@@ -1,35 +1,33 @@
-"""`design`: the best damper of a scene."""
+"""`design`: the best damper of a scene, found in stages (`STAGES`)."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING, Unpack
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Unpack
 
 import numpy as np
 
 from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.evaluation import evaluate
-from optim.methods.afterwards import looked_after, settled_status
-from optim.methods.eased import Eased
 from optim.methods.enough_harmonics import (
     by_first_response,
     by_the_better_known,
-    honest,
     mean_is_free,
     most_harmonics,
+    only_if_known,
     well_known,
     with_enough,
 )
 from optim.methods.evaluator import DesignSearch, SearchStoppedError, Tally
-from optim.methods.global_look import WholeRange
-from optim.methods.kkt import FLAT_SLOPE, Local, LocalSearch
-from optim.problem.design_problem import Method, Problem, pose
+from optim.methods.global_search import GlobalSearch
+from optim.methods.linearised import FLAT_SLOPE, Local, LocalSearch, settled_status
+from optim.methods.peak_tracking import tracked_optimum, tracked_starts
+from optim.methods.plateau import with_plateau
+from optim.problem.design_problem import Limit, Method, Problem, pose
 from optim.problem.problem_keys import OPTIONS, ROBUST, DesignKeys, keywords
-from optim.problem.typed import Limit, with_limits
-from optim.results.design_parts import SAME_PLACE, LocalOptimum, OnBest
-from optim.results.design_result import DesignResult, DesignStatus
+from optim.results.design_result import SAME_PLACE, DesignResult, DesignStatus, LocalOptimum, OnBest
 from solver.continuation.branch import BranchStatus
 from solver.jit.timer import clock
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
@@ -74,7 +72,7 @@ def design(
     TypeError
         An argument that is no key.
     """
-    posed = pose(scene, **with_limits(problem, limits))
+    posed = pose(scene, limits, **problem)
     return solve_problem(posed, on_progress=on_progress, should_stop=should_stop, on_best=on_best)
 
 
@@ -85,60 +83,122 @@ def solve_problem(
     should_stop: ShouldStop = None,
     on_best: OnBest = None,
 ) -> DesignResult:
-    """Search the best design of a problem; see `design`."""
-    tally = Tally(on_progress)
-    measured, told = by_first_response(problem, should_stop)
-    found = _solved(measured, tally.searching, should_stop, on_best, told=told)
+    """Search the best design of a problem, stage by stage; see `design`."""
+    begun = clock()
+    nothing = DesignResult(
+        problem=problem, method=problem.method, status=DesignStatus.NO_RESPONSE, evaluation=None,
+        conditions=None, basins=(), history=(), evaluations=0, work=0.0,
+    )  # fmt: skip
+    seen = Seen(
+        asked=problem, tally=Tally(on_progress), should_stop=should_stop, on_best=on_best, found=nothing
+    )
+    for stage in STAGES:
+        problem, seen = stage(problem, seen)
+    if seen.found.evaluation is not None:
+        seen.tally.tell(1.0)
+    return replace(seen.found, seconds=clock() - begun)
 
-    def by_max_abs() -> DesignResult:
-        """Search by what was asked for, from what the other measure has seen."""
-        seen = (*told, *found.looked_at, *found.history)
-        asked = _solved(problem, tally.again(found.evaluations), should_stop, on_best, told=seen)
-        return _counted(asked, found.evaluations)
 
-    if measured is not problem and not _free_at_its_best(found):
-        # The best design has a mean of its own, or there is none.
-        measured, found = problem, by_max_abs()
-    found = _counted(found, sum(one.computed for one in told))
-    most = most_harmonics(problem.harmonics)
-    found, more = _with_enough_harmonics(found, most, tally, should_stop, on_best)
-    if measured is not problem and not _known_by(found):
-        asked = by_max_abs()
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seen:
+    """What the stages before have seen, and who hears of it."""
+
+    asked: Annotated[Problem, "As it was asked."]
+    tally: Annotated[Tally, "Counts what all stages look at."]
+    should_stop: ShouldStop
+    on_best: OnBest
+    found: Annotated[DesignResult, "The best so far, with every design looked at and what that cost."]
+    guess: Annotated[
+        tuple[DesignEvaluation, ...], "The response that asks for another measure, until that is settled."
+    ] = ()
+    more: Annotated[tuple[DesignEvaluation, ...], "Optima with more harmonics than those searched with."] = ()
+    moved: Annotated[bool, "Whether the harmonics of the present optimum are still to be judged."] = True
+    level: Annotated[Problem | None, "By which the optimum was last looked at for its plateau."] = None
+
+
+Stage = Callable[[Problem, Seen], tuple[Problem, Seen]]
+
+
+def first_look(problem: Problem, seen: Seen) -> tuple[Problem, Seen]:
+    """Look at a response amid the range: by which measure is the problem to be solved?"""
+    measured, told = by_first_response(problem, seen.should_stop)
+    cost = sum(one.computed for one in told)
+    found = replace(seen.found, history=told, evaluations=cost, work=float(cost))
+    return measured, replace(seen, found=found, guess=told if measured is not problem else ())
+
+
+def search(problem: Problem, seen: Seen) -> tuple[Problem, Seen]:
+    """Search by the method; by the measure asked for where the mean of the best is not free, or none is."""
+    found = _searched(problem, seen.found, seen)
+    free = found.evaluation is not None and mean_is_free(found.evaluation)
+    if seen.guess and not free and found.status is not DesignStatus.STOPPED:
+        return seen.asked, replace(seen, found=_as_asked(found, seen), guess=())
+    return problem, replace(seen, found=found)
+
+
+def enough_harmonics(problem: Problem, seen: Seen) -> tuple[Problem, Seen]:
+    """Search again, by the right measure and with more harmonics, as long as the optimum asks for them.
+
+    Each search begins from what the one before has seen.
+    """
+    if not seen.moved:
+        return problem, seen
+    found, before, more = seen.found.with_errors(), None, list[DesignEvaluation]()
+    while True:
+        better, tried = with_enough(found, most_harmonics(seen.asked.harmonics), seen.should_stop)
+        more += tried
+        cost = sum(one.computed for one in tried)
+        found = replace(found, evaluations=found.evaluations + cost, work=found.work + cost)
+        if better is None:
+            break
+        told = (one for one in tried if one.harmonics == better.harmonics)  # its responses serve again
+        again = _searched(better, replace(found, history=(*found.history, *told)), seen)
+        if again.status is DesignStatus.STOPPED:
+            found = replace(found, status=DesignStatus.STOPPED)
+            break
+        if again.evaluation is None or not again.evaluation.good:
+            break
+        before = found if better.cases is not found.problem.cases else before
+        found = again.with_errors()
+    if before is not None:  # the measure is another one
+        found = by_the_better_known(before, found)
+    if seen.guess and not _known(found):
+        asked = _as_asked(found, seen)
         if asked.evaluation is not None and asked.status is not DesignStatus.STOPPED:
             found = by_the_better_known(asked.with_errors(), found)
-    if problem.method is Method.PERFORMANCE_CURVE:
-        return honest(found)  # it stands for no other design
-    chosen = looked_after(found, should_stop, tally.further, more)
-    if chosen.optimum != found.optimum:
-        # What is chosen of a plateau may be known less well than what was found on it.
-        found, more = _with_enough_harmonics(chosen, most, tally, should_stop, on_best)
-        again = found.problem is not chosen.problem
-        chosen = looked_after(found, should_stop, tally.further, more) if again else found
-    found = honest(chosen)
-    if found.status is DesignStatus.NO_RESPONSE and _undamped(found, should_stop):
+    return found.problem, replace(seen, found=found, more=tuple(more), guess=(), moved=False)
+
+
+def plateau(problem: Problem, seen: Seen) -> tuple[Problem, Seen]:
+    """Look how far other designs are as good, choose among them, and check optima with more harmonics."""
+    if problem is seen.level or problem.method is Method.PERFORMANCE_CURVE:  # a curve stands for one design
+        return problem, seen
+    found = with_plateau(seen.found, seen.should_stop, seen.tally.further, seen.more)
+    # What is chosen of a plateau may be known less well than what was found on it.
+    moved = found.optimum != seen.found.optimum
+    return problem, replace(seen, found=found, moved=moved, level=problem)
+
+
+def doubts(problem: Problem, seen: Seen) -> tuple[Problem, Seen]:
+    """Claim an optimum only of what is known, and say where nothing damps."""
+    found = only_if_known(seen.found)
+    followed = problem.method is Method.PERFORMANCE_CURVE
+    if found.status is DesignStatus.NO_RESPONSE and not followed and _undamped(found, seen.should_stop):
         found = replace(found, status=DesignStatus.UNDAMPED)
-    if found.evaluation is not None:
-        tally.tell(1.0)
-    return found
+    return problem, replace(seen, found=found)
 
 
-def _free_at_its_best(found: DesignResult) -> bool:
-    """Return whether the mean is free at what a search by half peak to peak has found, or it was stopped."""
-    if found.status is DesignStatus.STOPPED:
-        return True
-    return found.evaluation is not None and mean_is_free(found.evaluation)
+STAGES: tuple[Stage, ...] = (
+    first_look, search, enough_harmonics, plateau, enough_harmonics, plateau, doubts,
+)  # fmt: skip
+"""How a design is found: each stage takes the problem and what the ones before have seen, and adds to it."""
 
 
-def _known_by(found: DesignResult) -> bool:
+def _known(found: DesignResult) -> bool:
     """Return whether a design is known by its measure, has none to know, or its search was stopped."""
     if found.evaluation is None or found.status is DesignStatus.STOPPED:
         return True
     return well_known(found.problem, found.evaluation)
-
-
-def _counted(found: DesignResult, responses: int) -> DesignResult:
-    """Return a result with the responses computed before it."""
-    return replace(found, evaluations=found.evaluations + responses, work=found.work + responses)
 
 
 def _undamped(found: DesignResult, should_stop: ShouldStop) -> bool:
@@ -150,89 +210,51 @@ def _undamped(found: DesignResult, should_stop: ShouldStop) -> bool:
     return BranchStatus.UNDAMPED in ends
 
 
-def _with_enough_harmonics(
-    found: DesignResult, most: int, tally: Tally, should_stop: ShouldStop, on_best: OnBest
-) -> tuple[DesignResult, list[DesignEvaluation]]:
-    """Search again, by the right measure and with more harmonics, as long as the optimum asks for them.
-
-    Each search begins from what the one before has seen. With the result come the evaluations of optima
-    with more harmonics.
-    """
-    found = found.with_errors()
-    problem, tried = with_enough(found, most, should_stop)
-    responses = sum(one.computed for one in tried)
-    found = _counted(found, responses)
-    if problem is None:
-        return found, tried
-    same = problem.cases is found.problem.cases
-    told = tuple(one for one in tried if one.harmonics == problem.harmonics)  # its responses serve again
-    seen = replace(found, history=(*found.history, *told))
-    again = _solved(problem, tally.again(found.evaluations), should_stop, on_best, seen)
-    if again.status is DesignStatus.STOPPED:
-        return replace(found, status=DesignStatus.STOPPED), tried
-    if again.evaluation is None or not again.evaluation.good:
-        return found, tried
-    again = replace(
-        again, evaluations=again.evaluations + found.evaluations, work=again.work + found.work,
-        seconds=again.seconds + found.seconds,
-    )  # fmt: skip
-    again, more = _with_enough_harmonics(again, most, tally, should_stop, on_best)
-    return again if same else by_the_better_known(found, again), [*tried, *more]
+def _as_asked(found: DesignResult, seen: Seen) -> DesignResult:
+    """Return the end of a search by the measure asked for, from what another one has seen."""
+    history = (*seen.guess, *found.looked_at, *found.history)
+    return _searched(seen.asked, replace(found, looked_at=(), history=history), seen)
 
 
-def _solved(
-    problem: Problem, on_progress: OnProgress, should_stop: ShouldStop, on_best: OnBest,
-    before: DesignResult | None = None, told: Sequence[DesignEvaluation] = (),
-) -> DesignResult:  # fmt: skip
-    """Search the best design of a problem by its method.
+def _searched(problem: Problem, before: DesignResult, seen: Seen) -> DesignResult:
+    """Return the end of a search from what the one before has seen, which is counted in."""
+    found = _by_method(problem, before, seen)
+    return replace(found, evaluations=found.evaluations + before.evaluations, work=found.work + before.work)
 
-    `before`: of a search before with less known; `told`: designs whose responses serve again.
-    """
+
+def _by_method(problem: Problem, before: DesignResult, seen: Seen) -> DesignResult:
+    """Return the best design by the method of a problem; CasADi and CVXPY are loaded when they are needed."""
+    on_progress, should_stop = seen.tally.after(before.evaluations), seen.should_stop
     if problem.method is Method.PERFORMANCE_CURVE:
         from optim.methods.performance_curve import curve_optimum
 
         return curve_optimum(problem, on_progress=on_progress, should_stop=should_stop)
-    begun = clock()
     tracked = None
-    trackable = problem.method in (Method.AUTO, Method.TRACKED) and problem.why_not_tracked is None
-    if trackable:
-        from optim.methods.peak_tracking import tracked_optimum
-
-        tracked = tracked_optimum(problem, on_progress=on_progress, should_stop=should_stop, on_best=on_best)
+    if problem.method in (Method.AUTO, Method.TRACKED) and problem.why_not_tracked is None:
+        tracked = tracked_optimum(
+            problem, on_progress=on_progress, should_stop=should_stop, on_best=seen.on_best
+        )
         if problem.method is Method.TRACKED or tracked.status is not DesignStatus.NOT_TRACKED:
             return tracked
-    earlier = told if before is None else (*before.looked_at, *before.history)
-    search = DesignSearch(problem, on_progress, should_stop, on_best=on_best, before=earlier)
-    eased = Eased.of(search, tracked)
-    if eased.proven is not None:
-        return replace(eased.proven, seconds=clock() - begun)
-    found: list[Local] = []
-    if before is not None and before.problem.cases is not problem.cases:
-        before = None  # by another measure nothing is known but responses
-    seen = () if before is None else before.looked_at
-    whole = WholeRange(search, local_search_of(problem.method), found, seen)
-    others = () if before is None else [dict(basin.values) for basin in before.basins[1:]]
+    known = (*before.looked_at, *before.history)
+    evaluator = DesignSearch(problem, on_progress, should_stop, on_best=seen.on_best, before=known)
+    starts, proven = tracked_starts(evaluator, tracked)
+    if proven is not None:
+        return proven
+    same = before.problem.cases is problem.cases  # by another measure nothing is known but responses
+    whole = GlobalSearch(evaluator, local_search_of(problem.method), before.looked_at if same else ())
     try:
-        status = _search(whole, found, [*eased.starts, *others])
+        status = whole.run([*starts, *(dict(basin.values) for basin in before.basins[1:] if same)])
+        status = status or judge(min(whole.found, key=lambda end: end.standing), finished=whole.finished)
     except SearchStoppedError as stop:
         status = stop.status
-        if status is DesignStatus.TOO_MANY and found:
+        if status is DesignStatus.TOO_MANY and whole.found:
             status = DesignStatus.LOCAL
-    return _result(search, whole, status, begun)
-
-
-def _search(whole: WholeRange, found: list[Local], starts: Sequence[Mapping[str, float]]) -> DesignStatus:
-    """Look at the whole range and search locally from the best of it."""
-    flat = whole.run(starts)
-    if flat is None:
-        return DesignStatus.NO_RESPONSE
-    if flat:
-        return DesignStatus.FLAT
-    return judge(min(found, key=lambda local: local.standing), finished=whole.finished)
+    return _result(evaluator, whole, status)
 
 
 def local_search_of(method: Method) -> LocalSearch:
-    """Return the local search of a method; CasADi and CVXPY are loaded when they are needed."""
+    """Return the local search of a method."""
     if method is Method.IPOPT:
         from optim.methods.ipopt import ipopt_search
 
@@ -253,46 +275,39 @@ def judge(best: Local, *, finished: bool = True) -> DesignStatus:
         return DesignStatus.LOCAL
     if not best.feasible:
         return DesignStatus.INFEASIBLE
-    if not best.settled:
-        return DesignStatus.KINK
-    return settled_status(best.conditions)
+    return settled_status(best.conditions) if best.settled else DesignStatus.KINK
 
 
-def basins_of(search: DesignSearch, found: list[Local]) -> tuple[LocalOptimum, ...]:
+def _result(evaluator: DesignSearch, whole: GlobalSearch, status: DesignStatus) -> DesignResult:
+    """Put the result together; after a stop the best design so far stands in it."""
+    best = min(whole.found, key=lambda local: local.standing, default=None)
+    good = min(evaluator.good(), key=evaluator.merit, default=None)
+    responses = evaluator.scouted + sum(e.computed for e in evaluator.history)
+    return DesignResult(
+        problem=evaluator.problem,
+        method=Method.IPOPT if evaluator.problem.method is Method.IPOPT else Method.MINIMAX, status=status,
+        evaluation=best.evaluation if best else good, conditions=best.conditions if best else None,
+        basins=_basins(evaluator, whole.found), looked_at=whole.looked_at, history=tuple(evaluator.history),
+        evaluations=responses, work=float(responses),
+    )  # fmt: skip
+
+
+def _basins(evaluator: DesignSearch, found: list[Local]) -> tuple[LocalOptimum, ...]:
     """Return the local optima that differ, best first."""
     basins: list[LocalOptimum] = []
     places: list[list[float]] = []
     level: list[float] = []  # what is minimised where it does not change: one plateau is one optimum
     for local in sorted(found, key=lambda local: local.standing):
-        z = [variable.inside(local.evaluation.values[variable.name]) for variable in search.variables]
+        z = [variable.inside(local.evaluation.values[variable.name]) for variable in evaluator.variables]
         if any(math.dist(z, other) <= SAME_PLACE for other in places):
             continue
         height = local.evaluation.objective
-        if _is_level(search, local):
+        model = evaluator.model(local.evaluation)
+        held = model.heights >= model.heights.max(initial=0.0) * (1.0 - SAME_HEIGHT)
+        if np.all(np.abs(model.slopes[held]) <= FLAT_SLOPE):
             if any(abs(height - other) <= SAME_HEIGHT * abs(height) for other in level):
                 continue
             level.append(height)
         places.append(z)
         basins.append(local.optimum)
     return tuple(basins)
-
-
-def _is_level(search: DesignSearch, local: Local) -> bool:
-    """Return whether what is minimised does not change near an end."""
-    model = search.model(local.evaluation)
-    held = model.heights >= model.heights.max(initial=0.0) * (1.0 - SAME_HEIGHT)
-    return bool(np.all(np.abs(model.slopes[held]) <= FLAT_SLOPE))
-
-
-def _result(search: DesignSearch, whole: WholeRange, status: DesignStatus, begun: float) -> DesignResult:
-    """Put the result together; after a stop the best design so far stands in it."""
-    best = min(whole.found, key=lambda local: local.standing, default=None)
-    evaluation = best.evaluation if best else min(search.good(), key=search.merit, default=None)
-    method = Method.IPOPT if search.problem.method is Method.IPOPT else Method.MINIMAX
-    responses = search.scouted + sum(e.computed for e in search.history)
-    return DesignResult(
-        problem=search.problem, method=method, status=status, evaluation=evaluation,
-        conditions=None if best is None else best.conditions, basins=basins_of(search, whole.found),
-        looked_at=whole.looked_at, history=tuple(search.history), evaluations=responses,
-        work=float(responses), seconds=clock() - begun,
-    )  # fmt: skip

@@ -9,13 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from optim.criteria.band import BAND
 from optim.criteria.criterion import Criterion, CriterionRow
 from optim.criteria.peak_criterion import PEAK
 from solver.continuation.branch import Branch
 from solver.results.notes import MEAN_STRESS_OPEN
+from solver.results.told import json_number
+
+if TYPE_CHECKING:
+    from solver.results.known import Known
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,6 +109,19 @@ class DesignEvaluation:
         """The response of the first case."""
         return self.responses[0].branch
 
+    @property
+    def over_bands(self) -> dict[str, Branch]:
+        """Of each case the response over its band, which is its first."""
+        first: dict[str, Branch] = {}
+        for response in self.responses:
+            first.setdefault(response.case, response.branch)
+        return first
+
+    @property
+    def known_parts(self) -> list[tuple[str, Known]]:
+        """The name of each case with how well the peak of its response over its band is known."""
+        return [(case, branch.known) for case, branch in self.over_bands.items() if branch.peak is not None]
+
     def with_errors(self) -> DesignEvaluation:
         """Return it with the errors of its peaks estimated, where a search left that out."""
         from solver.continuation.branches.sweep import with_error
@@ -115,6 +132,26 @@ class DesignEvaluation:
     def violation(self, scales: Mapping[Criterion, float]) -> float:
         """Return the largest relative excess over a bound; −inf without bounds."""
         return max((row.excess(scales[row.quantity]) for row in self.rows), default=math.inf)
+
+    def to_json(self) -> dict[str, object]:
+        """Return its rows, its peaks, its bands, and how well each is known."""
+        bands = {case: branch.band for case, branch in self.over_bands.items()}
+        return {
+            "peaks": [{"value": peak.value, "at": peak.at_hz, "case": peak.case} for peak in self.peaks],
+            "bands": [
+                {
+                    "case": case, "limit": band.limit, "width_hz": band.width,
+                    "intervals_hz": [list(interval) for interval in band.intervals],
+                }
+                for case, band in bands.items()
+                if band is not None
+            ],
+            "objective": json_number(self.objective_told) if self.rows else None,
+            "rows": [row.to_json() for row in self.rows],
+            "errors": [
+                {"case": case, "peak": known.value, **known.to_json()} for case, known in self.known_parts
+            ],
+        }  # fmt: skip
 
 
 def nearest(row: CriterionRow, rows: Sequence[CriterionRow]) -> int | None:

@@ -58,7 +58,7 @@ def positive_limit(asked: CriterionContext) -> object:
     DesignError
         It is none.
     """
-    from optim.problem.problem_numbers import positive
+    from optim.problem.checks import positive
 
     ((name, value),) = asked.values.items()
     return positive(name, value)

@@ -77,8 +77,7 @@ def read_mode(asked: CriterionContext, key: str, number: str, *, needed: bool) -
     -------
     The limit, the modal amplitude [√kg m] and the number of the mode.
     """
-    from optim.errors import DesignError
-    from optim.problem.problem_numbers import positive, whole
+    from optim.problem.checks import DesignError, positive, whole
     from solver.errors import at
     from solver.modes.nonlinear_mode import pose
 

@@ -154,8 +154,3 @@ class Judge:
             problem=self.problem, case=self.case, branch=branch, gradients=self.gradients, hertz=hertz
         )  # fmt: skip
         return [row for criterion in over.criteria for row in criterion.rows(judged)]
-
-
-def natural_scales(problem: Problem) -> dict[Criterion, float]:
-    """Return what an excess over a bound of 0 is relative to, of every criterion in order."""
-    return {criterion: criterion.scale(problem.scene) for criterion in criteria()}

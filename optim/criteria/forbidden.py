@@ -24,7 +24,7 @@ def _rows(judged: Judged) -> list[CriterionRow]:
 
 def _read(asked: CriterionContext) -> Mapping[str, Ranges]:
     """The forbidden frequencies by case: those given, and those of the speeds by its order."""
-    from optim.errors import DesignError
+    from optim.problem.checks import DesignError
 
     hertz, speeds = (_ranges(name, asked.values.get(name)) for name in ("forbidden_hz", "speeds_rpm"))
     if asked.limit is None:
@@ -36,8 +36,7 @@ def _read(asked: CriterionContext) -> Mapping[str, Ranges]:
 
 
 def _ranges(name: str, ranges: object) -> Ranges:
-    from optim.errors import DesignError
-    from optim.problem.problem_numbers import number_pair
+    from optim.problem.checks import DesignError, number_pair
 
     if ranges is None:
         return ()

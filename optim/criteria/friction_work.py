@@ -81,7 +81,7 @@ def by_contact(key: str, limits: object, scene: Scene) -> Mapping[str, float]:
     DesignError
         What is wrong with the value `limits` of the key.
     """
-    from optim.problem.problem_numbers import positive_of_each
+    from optim.problem.checks import positive_of_each
 
     rubbing = [contact.name for contact in scene.contacts if contact.RUBBING]
     return positive_of_each(key, limits, [contact.name for contact in scene.contacts], rubbing, "contacts")

@@ -50,7 +50,7 @@ def _lacking(scene: Scene) -> str:
 
 
 def _read(asked: CriterionContext) -> object:
-    from optim.errors import DesignError
+    from optim.problem.checks import DesignError
 
     if _lacking(asked.scene):
         raise DesignError("max_mass", asked.values["max_mass"], _lacking(asked.scene))

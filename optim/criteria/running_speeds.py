@@ -37,8 +37,7 @@ def _rows(judged: Judged) -> list[CriterionRow]:
 
 
 def _read(asked: CriterionContext) -> _Running:
-    from optim.errors import DesignError
-    from optim.problem.problem_numbers import is_number, number_pair, positive
+    from optim.problem.checks import DesignError, is_number, number_pair, positive
 
     speeds, bound = asked.values.get(_SPEEDS), asked.values.get(_LIMIT)
     if speeds is None:

@@ -57,7 +57,7 @@ def _load_slope(contact: AnyContact, path: str) -> float:
 
 def _read(asked: CriterionContext) -> tuple[str, ...]:
     """The contacts that must never separate."""
-    from optim.errors import DesignError
+    from optim.problem.checks import DesignError
 
     states = asked.values[_KEY]
     if not isinstance(states, Mapping):

@@ -53,8 +53,7 @@ def by_row(key: str, given: object, names: list[str], lacking: str) -> Mapping[s
     DesignError
         What is wrong.
     """
-    from optim.errors import DesignError
-    from optim.problem.problem_numbers import positive_of_each
+    from optim.problem.checks import DesignError, positive_of_each
 
     if not names:
         raise DesignError(key, given, lacking)

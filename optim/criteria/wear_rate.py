@@ -26,7 +26,7 @@ def _rows(judged: Judged) -> list[CriterionRow]:
 
 def _read(asked: CriterionContext) -> Mapping[str, tuple[float | None, float]]:
     """The limit, if there is one, and the coefficient of every contact named."""
-    from optim.errors import DesignError
+    from optim.problem.checks import DesignError
 
     if _COEFFICIENT not in asked.values:
         raise DesignError(_COEFFICIENT, None, f"must be given with `{_RATE}` [m³/J]")

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from optim.errors import DataError, DesignError
 from optim.identification.data.response import ResponseRun
 from optim.identification.fit import MOST_STARTS, STARTS, LocalFit, Noise, Runs, Searched, search
 from optim.identification.identification_result import Estimate, Identification, IdentifyStatus, NotReached
@@ -18,7 +17,7 @@ from optim.identification.model_check import doubts
 from optim.identification.next_measurement import rank, read_candidates
 from optim.identification.reading import Given, read_data
 from optim.identification.unknowns import Unknowns, read_unknowns
-from optim.problem.problem_numbers import is_number
+from optim.problem.checks import DataError, DesignError, is_number
 from optim.problem.uncertainty_input import CONFIDENCE, read_uncertain
 from optim.problem.variables import Real
 from solver.balance.balance import check_harmonics

@@ -16,12 +16,11 @@ from typing import Annotated
 
 import numpy as np
 
-from optim.errors import DesignError
 from optim.identification.data.measured import MeasuredRows
 from optim.identification.fit import LocalFit, Runs
 from optim.identification.information import UNIFORM, Information
 from optim.identification.unknowns import Unknowns
-from optim.problem.problem_numbers import is_number
+from optim.problem.checks import DesignError, is_number
 from optim.problem.variables import Real
 from solver.balance.parameter import Kind, resolve
 from solver.errors import at

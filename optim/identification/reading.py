@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from optim.errors import DataError
 from optim.identification.data.measured import KINDS, DataKind, MeasuredRows, known_words
 from optim.identification.data.measured_table import Table, check_numbers, runs_of
 from optim.identification.data.measured_units import Dimension, unit_of
@@ -27,6 +26,7 @@ from optim.identification.readers.data_readers import (
 )
 from optim.identification.readers.encodings import text_of
 from optim.identification.readers.headings import Choice
+from optim.problem.checks import DataError
 from solver.errors import SettingError
 from solver.scene.parameter_paths import find_parameter
 from solver.scene.scene import Scene

@@ -8,8 +8,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from optim.errors import DesignError
-from optim.problem.problem_numbers import is_number
+from optim.problem.checks import DesignError, is_number
 from optim.problem.variables import (
     BoundedVariable,
     Real,

@@ -14,7 +14,6 @@ from optim.criteria.evaluation import evaluate
 from optim.problem.design_problem import Method, Problem
 from optim.results.design_result import DesignResult, DesignStatus
 from optim.results.doubts import WELL_KNOWN, doubt_of
-from optim.results.json import known_parts, over_bands
 from solver.balance.balance import build
 from solver.balance.kernels.output import HALF_RANGE, MAX_ABS
 from solver.balance.workspace import Workspace
@@ -43,7 +42,7 @@ def well_known(problem: Problem, evaluation: DesignEvaluation) -> bool:
 
 def doubt_in(problem: Problem, evaluation: DesignEvaluation) -> float:
     """Return the share by which the highest peak of a design may be higher."""
-    parts = [(case, _sized(b)) for case, b in over_bands(evaluation).items() if b.peak is not None]
+    parts = [(case, _sized(b)) for case, b in evaluation.over_bands.items() if b.peak is not None]
     return doubt_of(parts, {case.name: case.weight for case in problem.cases})
 
 
@@ -68,7 +67,7 @@ def _doubt_at_peaks(problem: Problem, evaluation: DesignEvaluation) -> float:
     finds nothing.
     """
     parts = []
-    for case, branch in over_bands(evaluation).items():
+    for case, branch in evaluation.over_bands.items():
         peak = branch.peaks[0]
         balance = build(
             branch.balance.scene, "frequency", harmonics=problem.harmonics, frequency_hz=None,
@@ -89,7 +88,7 @@ def _doubt_at_peaks(problem: Problem, evaluation: DesignEvaluation) -> float:
     return doubt_of(parts, {case.name: case.weight for case in problem.cases})
 
 
-def honest(result: DesignResult) -> DesignResult:
+def only_if_known(result: DesignResult) -> DesignResult:
     """Return a result that claims an optimum only if its highest peak and what limits it are known."""
     result = result.with_errors()
     problem, evaluation = result.problem, result.evaluation
@@ -171,7 +170,7 @@ def mean_is_free(evaluation: DesignEvaluation) -> bool:
     return any(
         MEAN_UNDETERMINED in known.flags
         and not known.peak_max_abs <= known.peak_half_peak_to_peak * (1.0 + NO_MEAN)
-        for _, known in known_parts(evaluation)
+        for _, known in evaluation.known_parts
     )
 
 
@@ -180,7 +179,7 @@ def by_the_better_known(before: DesignResult, after: DesignResult) -> DesignResu
     old, new = before.evaluation, after.evaluation
     if old is None or (new is not None and well_known(after.problem, new)):
         return after
-    parts = [known for _, known in known_parts(old)]
+    parts = [known for _, known in old.known_parts]
     if not all(max(known.relative, known.relative_max_abs) <= WELL_KNOWN for known in parts):
         return after
     return replace(before, problem=replace(before.problem, keeps_measure=True))
@@ -193,7 +192,7 @@ def _by_its_measure(problem: Problem, evaluation: DesignEvaluation) -> Problem:
     """
     if problem.keeps_measure or all(case.scene.observe.centred for case in problem.cases):
         return problem
-    if not any(_lopsided(known) for _, known in known_parts(evaluation)):
+    if not any(_lopsided(known) for _, known in evaluation.known_parts):
         return problem
     cases = tuple(replace(case, scene=_half_peak_to_peak(case.scene)) for case in problem.cases)
     method = Method.AUTO if problem.method is Method.TRACKED else problem.method

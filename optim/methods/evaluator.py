@@ -8,13 +8,11 @@ from dataclasses import replace
 from functools import partial
 
 from optim.criteria.constraint_rows import DesignEvaluation
-from optim.criteria.evaluation import evaluate, natural_scales
-from optim.criteria.linearised import Model, model_of
-from optim.methods.kkt import KEPT
+from optim.criteria.evaluation import evaluate
+from optim.methods.linearised import KEPT, Model, model_of
 from optim.problem.design_problem import Problem
 from optim.problem.variables import BoundedVariable
-from optim.results.design_parts import FEWER_HARMONICS, PEAKS_OPEN, VERIFIED, BestSoFar, OnBest
-from optim.results.design_result import DesignStatus
+from optim.results.design_result import FEWER_HARMONICS, PEAKS_OPEN, VERIFIED, BestSoFar, DesignStatus, OnBest
 from optim.results.doubts import open_peaks
 from solver.results.spread import Ahead
 from solver.results.watch import OnProgress, ShouldStop
@@ -42,7 +40,7 @@ class DesignSearch:
     ) -> None:  # fmt: skip
         self.problem = problem
         self.history: list[DesignEvaluation] = []
-        self.scales = natural_scales(problem)
+        self.scales = problem.scales
         self.should_stop = should_stop
         self.on_progress, self.on_best = on_progress, on_best
         self.scouted = 0  # responses of a coarse stage with fewer harmonics
@@ -110,12 +108,12 @@ class DesignSearch:
         self._before, self._scout = self._before + len(scout.history), None
         self.scouted += sum(evaluation.computed for evaluation in scout.history)
 
-    def easing(self, _share: float, sweeps: int) -> None:
+    def tracking(self, _share: float, sweeps: int) -> None:
         """Hear of responses to a problem without its limits."""
         if self.on_progress is not None:
             self.on_progress(share_of(self.count + sweeps), self.count + sweeps)
 
-    def eased(self, sweeps: int) -> None:
+    def tracked(self, sweeps: int) -> None:
         """Count those responses."""
         self._before += sweeps
         self.scouted += sweeps
@@ -197,15 +195,15 @@ class Tally:
         self._count = self._afterwards = 0
         self._searched = 0.0
 
-    def searching(self, share: float, count: int) -> None:
-        """Hear of the search: the `on_progress` to give to it."""
-        self._count = count
-        self._searched = max(self._searched, SEARCHED * share)
-        self.tell(self._searched)
-
-    def again(self, before: int) -> Callable[[float, int], None]:
+    def after(self, before: int) -> Callable[[float, int], None]:
         """Return the `on_progress` of a search that follows after so many evaluations."""
-        return lambda share, count: self.searching(share, before + count)
+
+        def hear(share: float, count: int) -> None:
+            self._count = before + count
+            self._searched = max(self._searched, SEARCHED * share)
+            self.tell(self._searched)
+
+        return hear
 
     def further(self) -> None:
         """Hear of another evaluation after the search."""

@@ -24,8 +24,7 @@ import numpy as np
 
 from optim.criteria.constraint_rows import DesignEvaluation, nearest
 from optim.criteria.criterion import CriterionRow
-from optim.criteria.linearised import Model
-from optim.methods.kkt import KKT_TOLERANCE, Evaluate, Local, ModelOf, ended
+from optim.methods.linearised import KKT_TOLERANCE, Evaluate, Local, Model, ModelOf, ended
 from optim.problem.variables import SNAP, BoundedVariable, Real, snapped, unscaled
 
 Second = Callable[[], Real | None]

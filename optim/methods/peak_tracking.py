@@ -1,22 +1,40 @@
-"""The tracked peak as a method: one variable, the highest peak of one case, exact to 1e-8."""
+"""The tracked peak as a method: one variable, the highest peak of one case, exact to 1e-8.
+
+With limits or several cases the tracked optimum of each case without limits is begun from; where that of a
+single case keeps all limits it is the optimum with them as well, and as well proven.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from optim.criteria.constraint_rows import CaseResponse, DesignEvaluation
+from optim.criteria.criterion import Limits
 from optim.criteria.evaluation import Judge, effects_of, evaluate, ranges_of
 from optim.criteria.peak_criterion import PEAK
-from optim.methods.afterwards import of_one
+from optim.methods.evaluator import DesignSearch, SearchStoppedError
+from optim.methods.linearised import of_one
 from optim.problem.design_problem import Method, Problem
-from optim.results.design_parts import PEAKS_OPEN, VERIFIED, BestSoFar, LocalOptimum, OnBest
-from optim.results.design_result import DesignResult, DesignStatus
+from optim.results.design_result import (
+    PEAKS_OPEN,
+    VERIFIED,
+    BestSoFar,
+    DesignResult,
+    DesignStatus,
+    LocalOptimum,
+    OnBest,
+)
 from solver.continuation.branch import Branch
-from solver.jit.timer import clock
 from solver.results.watch import OnProgress, ShouldStop
 from solver.studies.peaks.minimise_peak import least_peak
 from solver.studies.peaks.track_results import LeastPeak, TrackStatus
+
+if TYPE_CHECKING:
+    from optim.results.design_result import DesignResult
+
 
 _STATUS = {
     TrackStatus.TRACKED: DesignStatus.OPTIMAL,
@@ -49,7 +67,6 @@ def tracked_optimum(
     should_stop : asked between sweeps.
     on_best : told of every response that is the lowest so far.
     """
-    begun = clock()
     case, variable = problem.cases[0], problem.variables[0]
     first = None if problem.start is None else problem.start[variable.name]
     effects = effects_of(problem, case.scene)
@@ -71,7 +88,7 @@ def tracked_optimum(
     extra = float(evaluation is not None and problem.limit is not None)
     return of_one(
         problem, Method.TRACKED, _STATUS[found.status], evaluation, basins=basins,
-        evaluations=found.sweeps + int(extra), work=found.work + extra, seconds=clock() - begun,
+        evaluations=found.sweeps + int(extra), work=found.work + extra,
     )  # fmt: skip
 
 
@@ -109,3 +126,60 @@ def _evaluation(problem: Problem, found: LeastPeak) -> DesignEvaluation | None:
     rows = judge.rows(found.branch, ranges_of(problem, case)[0])
     response = CaseResponse(case=case.name, branch=found.branch)
     return DesignEvaluation(values={variable.name: found.at}, responses=(response,), rows=tuple(rows))
+
+
+NO_LIMITS = Limits()
+MOST_CASES = 4
+_OPTIMAL = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND)
+
+
+def tracked_starts(
+    search: DesignSearch, plain: DesignResult | None
+) -> tuple[list[dict[str, float]], DesignResult | None]:
+    """Return designs to begin from: the one asked for, and the optima of single cases without limits.
+
+    With them comes the optimum of a single case without limits, if it keeps them all. Tracking is counted by
+    `search`. `plain`: what tracking the problem itself came to, where that was tried.
+    """
+    problem = search.problem
+    starts = [] if problem.start is None else [dict(problem.start)]
+    if problem.method is not Method.AUTO or len(problem.cases) > MOST_CASES:
+        return starts, None
+    for one in _cases(problem):
+        tracked = plain or tracked_optimum(
+            one, on_progress=search.tracking, should_stop=search.should_stop
+        )  # fmt: skip
+        search.tracked(tracked.evaluations)
+        starts += [dict(basin.values) for basin in tracked.basins]
+        if len(problem.cases) == 1 and tracked.status in _OPTIMAL and starts:
+            proven = _kept(search, tracked)
+            if proven is not None:
+                return starts, proven
+    return starts, None
+
+
+def _cases(problem: Problem) -> list[Problem]:
+    """Return the plain problems of the single cases that can be tracked."""
+    if not problem.peak_alone:
+        return []
+    plain = [
+        replace(problem, cases=(case,), limits=NO_LIMITS, start=None, limit=None) for case in problem.cases
+    ]
+    return [one for one in plain if one.why_not_tracked is None]
+
+
+def _kept(search: DesignSearch, tracked: DesignResult) -> DesignResult | None:
+    """Return the tracked optimum with the rows of its limits if it keeps them all."""
+    if tracked.evaluation is None:
+        return None
+    try:
+        evaluation = search(tracked.evaluation.values)
+    except SearchStoppedError:
+        return None
+    if not evaluation.good or evaluation.violation(search.scales) > 0.0:
+        return None
+    responses = evaluation.computed
+    return of_one(
+        search.problem, Method.TRACKED, DesignStatus.OPTIMAL, evaluation, basins=tracked.basins,
+        evaluations=tracked.evaluations + responses, work=tracked.work + responses,
+    )  # fmt: skip

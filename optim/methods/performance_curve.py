@@ -18,13 +18,12 @@ from scipy.optimize import minimize, minimize_scalar
 
 from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.evaluation import evaluate
-from optim.methods.afterwards import of_one
 from optim.methods.evaluator import SearchStoppedError
+from optim.methods.linearised import of_one
 from optim.methods.surrogate import quasi_random
 from optim.problem.design_problem import Method, Problem
 from optim.problem.variables import BoundedVariable, Real, by_variables, parameter_values, unscaled
-from optim.results.design_parts import CurveCheck
-from optim.results.design_result import DesignResult, DesignStatus
+from optim.results.design_result import CurveCheck, DesignResult, DesignStatus
 from solver.jit.timer import clock
 from solver.modes.peaks.peak_correction import corrected_peak
 from solver.modes.peaks.peak_gradient import CurvePeak, peak_at_excitation
@@ -96,7 +95,7 @@ def curve_optimum(problem: Problem, *, on_progress: OnProgress, should_stop: Sho
         computed = int(evaluation is not None)
         return of_one(
             problem, Method.PERFORMANCE_CURVE, status, evaluation, basins=(), curve=check,
-            evaluations=computed, work=float(computed), seconds=clock() - begun,
+            evaluations=computed, work=float(computed),
         )  # fmt: skip
 
     curves = _Curves(problem=problem, should_stop=should_stop, on_progress=on_progress)

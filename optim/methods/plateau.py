@@ -6,21 +6,24 @@ is made least, then the resonance band, then the variable itself.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
 
 from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.criterion import CriterionRow
-from optim.criteria.evaluation import evaluate, natural_scales
+from optim.criteria.evaluation import evaluate
 from optim.criteria.peak_criterion import PEAK
-from optim.methods.evaluator import SearchStoppedError
-from optim.methods.kkt import KEPT
-from optim.problem.design_problem import Problem
+from optim.methods.enough_harmonics import MOST_HARMONICS
+from optim.methods.evaluator import DesignSearch, SearchStoppedError
+from optim.methods.linearised import KEPT, KKT_TOLERANCE, conditions, model_of, optimum_at, settled_status
+from optim.problem.design_problem import Method, Problem
 from optim.problem.variables import BoundedVariable, parameter_values
-from optim.results.design_result import DesignStatus
+from optim.results.design_result import Checked, DesignResult, DesignStatus, LocalOptimum
+from optim.results.doubts import DOUBTFUL, open_peaks
 from solver.continuation.bracketing import least_between, level_up_to
 from solver.response.solve import solve
 from solver.results.watch import ShouldStop
@@ -32,6 +35,9 @@ SAME = 1e-12  # relative, of numbers of two responses that are one
 PLACES = 9  # designs on a plateau that the next criterion is compared at
 PRECISE = 1e-7  # scaled, to which its least place is known
 BROAD = 1e-5  # scaled width from which the next criterion is level too
+
+MOST_CHECKED = 4
+MOST_AGAIN = 4  # times that a plateau is looked for, each but the last at a better design met on the way
 
 Along = Callable[[float], DesignEvaluation]
 TieBreak = Callable[[DesignEvaluation], float | None]
@@ -58,9 +64,7 @@ class DesignPlateau:
     responses: Annotated[int, "Frequency responses computed."]
 
 
-def plateau_of(
-    problem: Problem, best: DesignEvaluation, should_stop: ShouldStop, tick: Tick = nothing
-) -> DesignPlateau | None:
+def plateau_of(result: DesignResult, should_stop: ShouldStop, tick: Tick = nothing) -> DesignPlateau | None:
     """Return the plateau an optimum lies on; None if it is sharp in every variable. Every design ticks.
 
     Raises
@@ -68,6 +72,9 @@ def plateau_of(
     StoppedError
         The caller asked to stop.
     """
+    problem, best = result.problem, result.evaluation
+    if best is None:
+        return None
     level = _Level(problem, best, should_stop, tick)
     here, chosen_by = best, ""
     for variable in problem.variables:
@@ -97,7 +104,7 @@ class _Level:
 
     def __init__(self, problem: Problem, best: DesignEvaluation, should_stop: ShouldStop, tick: Tick) -> None:
         self._problem, self._should_stop, self._tick = problem, should_stop, tick
-        self._scales = natural_scales(problem)
+        self._scales = problem.scales
         self._enough = best.objective * (1.0 + LEVEL)
         self._allowed = max(best.violation(self._scales), KEPT)
         self._found: dict[tuple[str, float], tuple[float, float]] = {}
@@ -285,3 +292,142 @@ def _next_peak(problem: Problem, there: DesignEvaluation, held: CriterionRow) ->
             if not mine:
                 others.append(weights[response.case] * peak.value)
     return max(others, default=None)
+
+
+def with_plateau(
+    result: DesignResult, should_stop: ShouldStop, tick: Tick = nothing, more: Sequence[DesignEvaluation] = ()
+) -> DesignResult:
+    """Return a result with its plateau and its check by more harmonics; as far as the caller lets it.
+
+    Parameters
+    ----------
+    result : of a search.
+    should_stop : asked between responses.
+    tick : called after every design looked at.
+    more : evaluations with more harmonics that are known already.
+    """
+    found = result
+    stopped = result.status in (DesignStatus.STOPPED, DesignStatus.NO_RESPONSE)
+    if result.evaluation is not None and result.evaluation.good and not stopped:
+        try:
+            found = _checked(_level(found, should_stop, tick).with_errors(), should_stop, tick, more)
+        except SearchStoppedError:
+            found = replace(found, status=DesignStatus.STOPPED)
+    claims = found.status in (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND)
+    if claims and found.evaluation is not None and open_peaks(found.evaluation):
+        return replace(found, status=DesignStatus.LOCAL)  # a higher peak may hide in its responses
+    return found
+
+
+def _level(result: DesignResult, should_stop: ShouldStop, tick: Tick) -> DesignResult:
+    """Return a result with the plateau its optimum lies on, at the design chosen of it."""
+    if result.status is DesignStatus.FLAT:
+        return replace(result, plateau={v.name: (v.low, v.high) for v in result.problem.variables})
+    for _ in range(MOST_AGAIN):
+        plateau = plateau_of(result, should_stop, tick)
+        if plateau is None:
+            return result
+        if plateau.better is None:
+            return _at(result, plateau)
+        result = _improved(result, plateau.better, should_stop, tick)
+    return result
+
+
+def _at(result: DesignResult, plateau: DesignPlateau) -> DesignResult:
+    """Return a result at the design chosen of its plateau."""
+    evaluation = plateau.evaluation
+    status = result.status
+    model = model_of(evaluation, result.problem.variables, evaluation.objective, result.problem.scales)
+    found = conditions(model, result.problem.variables, feasibility=model.violation > KEPT)
+    if status in (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK):
+        settled = found.residual <= KKT_TOLERANCE
+        status = settled_status(found) if settled else status
+    history = result.history if evaluation is result.evaluation else (*result.history, evaluation)
+    if evaluation is not result.evaluation and len(result.history) == 1:
+        history = (evaluation,)
+    return replace(
+        result, status=status, evaluation=evaluation, conditions=found, history=history,
+        basins=_merged(result, plateau), plateau=plateau.intervals, chosen_by=plateau.chosen_by,
+        evaluations=result.evaluations + plateau.responses, work=result.work + plateau.responses,
+    )  # fmt: skip
+
+
+def _improved(
+    result: DesignResult, begin: DesignEvaluation, should_stop: ShouldStop, tick: Tick
+) -> DesignResult:
+    """Return a result after a local search from a better design that was met beside a plateau."""
+    from optim.methods.minimax import thorough_search  # loads CVXPY, which most designs need not
+
+    search = DesignSearch(result.problem, lambda _share, _count: tick(), should_stop)
+    search.keep(begin)
+    local = thorough_search(search, search.variables, begin, search.model)
+    status = result.status
+    if status in (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK):
+        status = settled_status(local.conditions) if local.settled else DesignStatus.KINK
+    responses = sum(one.computed for one in search.history)
+    return replace(
+        result, method=Method.MINIMAX, status=status, evaluation=local.evaluation,
+        conditions=local.conditions,
+        basins=(local.optimum, *result.basins), history=(*result.history, *search.history),
+        evaluations=result.evaluations + responses, work=result.work + responses,
+    )  # fmt: skip
+
+
+def _merged(result: DesignResult, plateau: DesignPlateau) -> tuple[LocalOptimum, ...]:
+    """Return the local optima with those of one plateau as one, at the design chosen."""
+    chosen = plateau.evaluation
+    first = optimum_at(chosen, settled=True, feasible=all(basin.feasible for basin in result.basins[:1]))
+    others = [
+        basin
+        for basin in result.basins[1:]
+        if basin.objective > chosen.objective * (1.0 + 1e-6) or not _on(plateau, basin, chosen)
+    ]
+    return (first, *others)
+
+
+def _on(plateau: DesignPlateau, basin: LocalOptimum, chosen: DesignEvaluation) -> bool:
+    """Return whether a basin lies on a plateau: along its variables within it, elsewhere at its place."""
+    for name, value in basin.values.items():
+        low, high = plateau.intervals.get(name, (chosen.values[name], chosen.values[name]))
+        if not low * (1.0 - 1e-3) <= value <= high * (1.0 + 1e-3):
+            return False
+    return True
+
+
+def _checked(
+    result: DesignResult, should_stop: ShouldStop, tick: Tick, more: Sequence[DesignEvaluation]
+) -> DesignResult:
+    """Return a result with its local optima computed again where the harmonics may be too few."""
+    few = result.problem.harmonics
+    if result.evaluation is None or 2 * few > MOST_HARMONICS or result.status is DesignStatus.FLAT:
+        return result
+    if not any(known.relative > DOUBTFUL for _, known in result.evaluation.known_parts):
+        return result
+    problem = replace(result.problem, harmonics=2 * few)
+    designs = [result.optimum, *(dict(basin.values) for basin in result.basins[1:MOST_CHECKED])]
+    checked, responses = [], 0
+    for values in designs:
+        if should_stop is not None and should_stop():
+            raise SearchStoppedError(DesignStatus.STOPPED)
+        same = (one for one in more if one.values == values and one.harmonics == problem.harmonics)
+        found = next(same, None)
+        if found is None:
+            seen = (one for one in (result.evaluation, *result.history) if one.values == values)
+            found = evaluate(
+                problem, values, gradients=False, errors=False, should_stop=should_stop,
+                before=next(seen, None),
+            )  # fmt: skip
+            responses += found.computed
+            tick()
+        good = found.good and bool(found.peaks)
+        checked.append(
+            Checked(
+                values=dict(values), harmonics=2 * few, peak=found.peaks[0].value if good else math.nan,
+                objective=found.objective_told if good else math.nan,
+                feasible=good and found.violation(problem.scales) <= KEPT,
+            )
+        )  # fmt: skip
+    return replace(
+        result, checked=tuple(checked), evaluations=result.evaluations + responses,
+        work=result.work + responses,
+    )  # fmt: skip

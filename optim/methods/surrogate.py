@@ -18,7 +18,7 @@ from typing import Annotated
 
 import numpy as np
 
-from optim.criteria.linearised import Model
+from optim.methods.linearised import Model
 from optim.problem.variables import Real
 
 LOOKS_ONE = 17  # designs of a look with one variable

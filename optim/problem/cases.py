@@ -3,18 +3,62 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from typing import Annotated
 
-from optim.errors import DesignError
-from optim.problem.problem_numbers import number_pair, positive, whole
+from optim.problem.checks import DesignError, number_pair, positive, whole
 from optim.problem.variables import BoundedVariable
 from solver.errors import Place, SettingError, at
 from solver.scene.scene import Scene
 
 _KEYS = ("name", "set", "band", "observe", "engine_order", "order", "weight")
 SAME = 1e-9  # relative, of a parameter that stays
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Case(Mapping[str, object]):
+    """One load case of a design problem; what is left out is the scene's own.
+
+    It is the table that ``cases`` takes, so both can stand in one list.
+
+    Attributes
+    ----------
+    name : str or None
+        How results call it.
+    set : mapping or None
+        Values of this case alone, parameter path to value; no variable.
+    band : (low, high) or None
+        Frequencies [Hz].
+    observe : str or list of str or None
+        DOF whose amplitude counts, or several.
+    engine_order : int or None
+        Of every excitation; cyclic scenes only.
+    order : int or None
+        Excitations a revolution; the engine order, else 1.
+    weight : float or None
+        By which its peaks count in what is minimised; 1.
+    """
+
+    name: str | None = None
+    set: Mapping[str, float] | None = None
+    band: tuple[float, float] | None = None
+    observe: str | Sequence[str] | None = None
+    engine_order: int | None = None
+    order: int | None = None
+    weight: float | None = None
+
+    def __getitem__(self, key: str) -> object:
+        value = getattr(self, key) if key in {one.name for one in fields(self)} else None
+        if value is None:
+            raise KeyError(key)
+        return value
+
+    def __iter__(self) -> Iterator[str]:
+        return iter([one.name for one in fields(self) if getattr(self, one.name) is not None])
+
+    def __len__(self) -> int:
+        return len(list(iter(self)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 from optim.criteria.criterion import Criterion, CriterionContext, Goals, Limits
 from optim.criteria.criterion_registry import by_weight, criteria, limit_keys, weight_words
 from optim.criteria.peak_criterion import PEAK
-from optim.errors import DesignError
 from optim.problem.cases import LoadCase, read_cases
+from optim.problem.checks import DesignError, is_number, positive, word
+from optim.problem.checks import Method as Method
 from optim.problem.problem_keys import BASINS, HARMONICS, MOST_BASINS, TOLERANCE
-from optim.problem.problem_numbers import is_number, positive, word
 from optim.problem.variables import BoundedVariable, beside_cases, check_variables
-from optim.problem.words import Method as Method
 from solver.balance.balance import check_harmonics
 from solver.contacts.laws.contact_law import without_second
 from solver.scene.parameter_paths import parameter_of
 from solver.scene.scene import Scene
+from solver.wording import nearest
+
+MOST_WORD = "max_"  # which keys of a largest value begin with
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +41,11 @@ class Problem(Goals):
         "Whether the measure that the scene observes stays where the mean is free: designs that are "
         "compared need one measure.",
     ] = False
+
+    @property
+    def scales(self) -> dict[Criterion, float]:
+        """What an excess over a bound of 0 is relative to, of every criterion in order."""
+        return {criterion: criterion.scale(self.scene) for criterion in criteria()}
 
     @property
     def plain(self) -> bool:
@@ -84,11 +91,12 @@ class Problem(Goals):
         return None
 
 
-def pose(scene: Scene, **given: Any) -> Problem:
+def pose(scene: Scene, limits: Sequence[Limit] = (), **given: Any) -> Problem:
     """Check a design problem and put it together.
 
     Parameters
     ----------
+    limits : bounds with types, in place of the keys `max_peak` and its like.
     given : keys of `problem_keys.DesignKeys` but those of an uncertainty; None stands for left out.
 
     Raises
@@ -98,6 +106,7 @@ def pose(scene: Scene, **given: Any) -> Problem:
     TypeError
         An argument that is no key of a problem.
     """
+    given = with_limits(given, limits)
     known = {*WITH_OTHERS, *READERS, *(key.name for key in limit_keys())}
     unknown = next((name for name in given if name not in known), None)
     if unknown is not None:
@@ -108,16 +117,16 @@ def pose(scene: Scene, **given: Any) -> Problem:
     limit = keys["limit"]
     if limit is not None:
         positive("limit", limit)
-    limits = _limits(scene, cases, limit, keys)
+    kept = _limits(scene, cases, limit, keys)
     basins, weights = _basins(keys["basins"]), _weights(keys["weights"])
     for one in (one for one, weight in weights.items() if weight > 0.0 and one.lacking(scene)):
         raise DesignError(("weights", one.weight), weights[one], one.lacking(scene))
     for one in (one for one, weight in weights.items() if weight > 0.0 and one.needs):
-        if limits.of(one) is None:
+        if kept.of(one) is None:
             raise DesignError(("weights", one.weight), weights[one], f"needs `{one.needs}`")
     problem = Problem(
         scene=scene, variables=chosen, cases=cases, limit=limit, weights=weights,
-        limits=limits, harmonics=_harmonics(keys["harmonics"]), start=read_start(chosen, keys["start"]),
+        limits=kept, harmonics=_harmonics(keys["harmonics"]), start=read_start(chosen, keys["start"]),
         method=_method(keys["method"]), basins=basins, tolerance=_tolerance(keys["tolerance"]),
     )  # fmt: skip
     if problem.method is Method.PERFORMANCE_CURVE:
@@ -128,6 +137,55 @@ def pose(scene: Scene, **given: Any) -> Problem:
     if problem.method is Method.TRACKED and problem.why_not_tracked is not None:
         raise DesignError("method", keys["method"], f"must be another one: {problem.why_not_tracked}")
     return problem
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """An upper bound that a design must keep.
+
+    Attributes
+    ----------
+    what : str
+        `peak` [m], `band_hz` [Hz], `friction_work` [J], or of what another criterion has a key ``max_…``.
+    at_most : float
+        The bound.
+    contact : str or None
+        The contact that it holds for, of what is a limit for each contact.
+    """
+
+    what: str
+    at_most: float
+    contact: str | None = None
+
+
+def with_limits(problem: Mapping[str, object], limits: Sequence[Limit]) -> dict[str, object]:
+    """Return the keys of a problem with limits among them.
+
+    Raises
+    ------
+    DesignError
+        A limit of what is not known, or one that is given twice.
+    """
+    found = dict(problem)
+    known = [key.name for key in limit_keys() if key.name.startswith(MOST_WORD)]
+    for i, one in enumerate(limits):
+        if not isinstance(one, Limit):
+            raise DesignError(("limits", i), one, 'must be a Limit, such as Limit("peak", 1e-4)')
+        key = f"{MOST_WORD}{one.what}"
+        if key not in known:
+            words = [name.removeprefix(MOST_WORD) for name in known]
+            wanted = f"is not known; there are limits of {', '.join(words)}{nearest(str(one.what), words)}"
+            raise DesignError(("limits", i, "what"), one.what, wanted)
+        before = found.get(key)
+        if one.contact is None and before is None:
+            found[key] = one.at_most
+        elif one.contact is not None and (before is None or isinstance(before, Mapping)):
+            if before is not None and one.contact in before:
+                raise DesignError(("limits", i), one.what, f"is given twice for {one.contact!r}")
+            found[key] = {**(before or {}), one.contact: one.at_most}
+        else:
+            raise DesignError(("limits", i), one.what, "is given twice")
+    return found
 
 
 def _weights(weights: Mapping[str, float] | None) -> dict[Criterion, float]:

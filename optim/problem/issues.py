@@ -12,8 +12,8 @@ from typing import Any
 from optim.criteria.criterion import CriterionContext
 from optim.criteria.criterion_registry import criteria
 from optim.problem.cases import read_case, read_cases
+from optim.problem.checks import positive
 from optim.problem.design_problem import READERS, pose, read_start
-from optim.problem.problem_numbers import positive
 from optim.problem.uncertainty_input import read_uncertain
 from optim.problem.variables import beside_cases, check_variables
 from solver.errors import Issue, Place, SceneError, SettingError

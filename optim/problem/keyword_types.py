@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Literal, TypedDict
 
-from optim.problem.words import Method, MethodWord, ScalingWord
+from optim.problem.checks import Method, MethodWord, ScalingWord
 
 
 class ProblemKeywords(TypedDict, total=False):

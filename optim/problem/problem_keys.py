@@ -10,7 +10,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Container, Iterable
 from textwrap import fill
-from typing import Annotated, Any, Literal, Optional, TypeVar, get_args, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Optional, TypeVar, get_args, get_type_hints
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, create_model
 
@@ -30,8 +30,11 @@ from optim.criteria.key import (
     PositiveNumber,
     Share,
 )
-from optim.problem.words import AimWord, MethodWord, ScalingWord
+from optim.problem.checks import AimWord, MethodWord, ScalingWord
 from solver.scene.descriptions import DAMPER_LOAD, DISK_LOAD, DISK_LOADS
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
 
 MAX_UNCERTAIN = 2000
 
@@ -378,3 +381,23 @@ def _told(name: str, description: str) -> str:
     # The first letter is small there, but for symbols.
     text = description if description[1:2].isupper() else description[0].lower() + description[1:]
     return fill(f"{name} : {text}", _WIDTH, initial_indent="    ", subsequent_indent=" " * 8) + "\n"
+
+
+BELOW, ABOVE = 10.0, 15.0
+"""How far the range that is designed by itself goes below and above the value of a scene, as factors."""
+
+
+def default_variable(scene: Scene) -> str | None:
+    """Return the path that is designed by itself; None where the scene suggests none.
+
+    Mass or normal load of the first damper that has one, else the normal load of the first contact with a
+    tied load, else of the first contact.
+    """
+    for damper in scene.dampers:
+        for key in ("mass", "N0"):
+            if key in damper.parameters and scene.value(f"{damper.name}.{key}") > 0.0:
+                return f"{damper.name}.{key}"
+    rubbing = [(contact, contact.load) for contact in scene.contacts if contact.load is not None]
+    tied = [(contact, load) for contact, load in rubbing if load.ratio is not None]
+    first = next((contact for contact, _ in tied or rubbing), None)
+    return None if first is None else f"{first.group or first.name}.N0"

@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import gammaincinv
 
-from optim.errors import DesignError
 from optim.problem.cases import LoadCase, displaced
-from optim.problem.problem_numbers import is_number
+from optim.problem.checks import DesignError, is_number
 from optim.problem.uncertainty_set import Coordinate, Disk, How, Scenario, UncertainSet, UncertaintyShape
 from optim.problem.variables import BoundedVariable, Real
 from solver.balance.parameter import Kind, resolve

@@ -11,10 +11,8 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from optim.errors import DesignError
-from optim.problem.default_variable import ABOVE, BELOW, default_variable
-from optim.problem.problem_numbers import number_pair, word
-from optim.problem.words import Scaling
+from optim.problem.checks import DesignError, Scaling, number_pair, word
+from optim.problem.problem_keys import ABOVE, BELOW, default_variable
 from solver.balance.parameter import Kind, resolve
 from solver.errors import at
 from solver.scene.parameter_paths import AMPLITUDE

@@ -1,9 +1,9 @@
-"""What a design search returns."""
+"""What a design search returns: the best design, local optima, the best so far, what a curve is worth."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -11,10 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from optim.criteria.band import BAND
 from optim.criteria.criterion import CriterionRow
 from optim.criteria.peak_criterion import PEAK
-from optim.problem.words import Method
-from optim.results.design_parts import CatalogueOption, Checked, CurveCheck, LocalOptimum
+from optim.problem.checks import Method
 from optim.results.doubts import doubts_of
-from optim.results.json import conditions_json, evaluation_json, known_parts, looked_json, over_bands
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known, Stable, Verdict, worst
@@ -25,12 +23,177 @@ from solver.results.views import Views, on_demand
 
 if TYPE_CHECKING:
     from optim.criteria.constraint_rows import DesignEvaluation
-    from optim.criteria.linearised import Conditions
     from optim.problem.design_problem import Problem
     from solver.continuation.branch import Branch
 
+
+SAME_PLACE = 1e-3  # scaled distance within which two optima are one
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class LocalOptimum(Piece):
+    """A local optimum."""
+
+    values: Annotated[Mapping[str, float], "Variable name to value."]
+    peak: Annotated[float, "Highest peak [m]."]
+    objective: Annotated[float, "What is minimised."]
+    settled: Annotated[bool, "Whether the first-order conditions hold there."]
+    feasible: Annotated[bool, "Whether the limits are kept there."]
+    proven: Annotated[
+        bool,
+        "Whether a response there was computed, so that no peak is higher than `peak`. A further basin of "
+        "the tracked peak is solved for along the peaks that were followed: it is at least that high.",
+    ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Checked(Piece):
+    """A local optimum again with more harmonics."""
+
+    JSON: ClassVar = "values n_harmonics=harmonics peak objective feasible"
+
+    values: Annotated[Mapping[str, float], "Variable name to value."]
+    harmonics: Annotated[int, "Highest harmonic kept."]
+    peak: Annotated[float, "Highest peak [m]; NaN where a response could not be computed."]
+    objective: Annotated[float, "What is minimised; NaN likewise."]
+    feasible: Annotated[bool, "Whether the limits are kept."]
+
+
+class OptionStatus(Enum):
+    """What became of an option; the value is a sentence."""
+
+    FEASIBLE = "It keeps all limits."
+    INFEASIBLE = "No design of it keeps all limits."
+    CUT = "Its mass alone is no better than the best design of another option."
+    UNKNOWN = "No design of it could be computed: use more harmonics or a narrower band."
+    STOPPED = "Stopped by the caller before it was looked at."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class CatalogueOption(Piece):
+    """One option of a catalogue."""
+
+    name: Annotated[str, "As it was given."]
+    status: Annotated[OptionStatus, "What became of it."]
+    objective: Annotated[float, "Of its best design; inf without one."]
+    least: Annotated[float, "What its objective cannot fall below, by its mass alone."]
+    values: Annotated[Mapping[str, float], "Variable to value of its best design; empty without variables."]
+
+
+VERIFIED = "Its whole response was computed with all harmonics."
+FEWER_HARMONICS = "Ranked with fewer harmonics; those that count are computed with all of them."
+PEAKS_OPEN = "Its response was computed, but a higher peak may lie between its points."
+NOMINAL = "The best without the uncertainty; what that does to it is looked at next."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class BestSoFar(Piece):
+    """The best design of a search on its way; the result may be another."""
+
+    values: Annotated[Mapping[str, float], "The design."]
+    peak: Annotated[
+        float, "Its highest peak [m]; of a robust design the highest over the scenarios looked at."
+    ]
+    objective: Annotated[float, "What is minimised."]
+    feasible: Annotated[bool, "Whether it keeps the limits."]
+    verified: Annotated[
+        bool, "Whether these are the numbers of whole responses of the problem as it was asked."
+    ]
+    words: Annotated[str, "What is known of it, a sentence."]
+    evaluations: Annotated[int, "Designs, of a tracked peak responses, looked at when it was found."]
+
+
+OnBest = Callable[[BestSoFar], None] | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class CurveCheck(Piece):
+    """The peak of the performance curve at its optimum, beside exact ones."""
+
+    JSON: ClassVar = (
+        "mode shared curves synthesised corrected exact estimate error tolerance suffices holds curve_seconds"
+        " correction_seconds response_seconds seconds_saved"
+    )
+
+    mode: Annotated[int, "Number of the mode that the curve is of."]
+    shared: Annotated[bool, "One curve served all designs, because forces, loads and motions grow together."]
+    curves: Annotated[int, "Curves followed."]
+    synthesised: Annotated[float, "Peak of the curve at its optimum [m]."]
+    corrected: Annotated[
+        float,
+        "What the whole balance next to the synthesised motion makes of it [m]; NaN if that was not found.",
+    ]
+    exact: Annotated[float, "Highest peak of the whole response [m]; NaN if it could not be computed."]
+    tolerance: Annotated[float, "Relative error up to which the curve suffices."]
+    curve_seconds: Annotated[float, "What the search on curves took [s]."]
+    correction_seconds: Annotated[float, "What the correction took [s]."]
+    response_seconds: Annotated[float, "What the whole response took [s]."]
+    exact_responses: Annotated[float, "The work of an exact search, in whole responses, at least."]
+
+    @property
+    def estimate(self) -> float:
+        """Relative error of the curve's peak by the correction, without a whole response; NaN if unknown."""
+        return self.synthesised / self.corrected - 1.0
+
+    @property
+    def error(self) -> float:
+        """Relative error of the curve's peak."""
+        return self.synthesised / self.exact - 1.0
+
+    @property
+    def suffices(self) -> bool:
+        """Whether the estimate alone says that the curve suffices."""
+        return abs(self.estimate) <= self.tolerance
+
+    @property
+    def holds(self) -> bool:
+        """Whether the curve is as good as asked for, by the whole response."""
+        return abs(self.error) <= self.tolerance
+
+    @property
+    def seconds_saved(self) -> float:
+        """Time [s] saved against an exact search of the least work; below 0 if that had been quicker."""
+        spent = self.curve_seconds + self.correction_seconds + self.response_seconds
+        return self.exact_responses * self.response_seconds - spent
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as a JSON object."""
+        return self._json(holds=math.isfinite(self.error) and self.holds)
+
+
 SAME_HEIGHT = 1e-5  # relative distance within which rows count as equally high
 AT_LIMIT = 1e-4  # relative distance from a bound within which a limited row holds the design
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Conditions:
+    """The Karush-Kuhn-Tucker conditions of a design: which rows hold it, with which force."""
+
+    rows: Annotated[
+        tuple[tuple[CriterionRow, float], ...],
+        "Active rows with their multipliers: objective rows of one quantity sum to 1; those of limited "
+        "rows say by how much of the objective's scale the optimum falls for a relative relief of the "
+        "bound.",
+    ]
+    bounds: Annotated[
+        tuple[tuple[str, str, float], ...],
+        "Variable, ``lower`` or ``upper``, and multiplier, of the variables on a bound.",
+    ]
+    residual: Annotated[
+        float, "Largest component of the gradient of the Lagrangian, relative objective per scaled variable."
+    ]
+    violation: Annotated[float, "Largest relative excess over a bound."]
+
+    def to_json(self) -> dict[str, object]:
+        """Return them as one JSON object."""
+        return {
+            "residual": json_number(self.residual), "violation": json_number(self.violation),
+            "rows": [
+                {"what": row.what, "case": row.case, "quantity": row.quantity.name, "multiplier": x}
+                for row, x in self.rows
+            ],
+            "bounds": [{"variable": name, "side": side, "multiplier": x} for name, side, x in self.bounds],
+        }  # fmt: skip
 
 
 class DesignStatus(Enum):
@@ -155,7 +318,7 @@ class DesignResult(MadeOfResponses, Drawn):
     ]
     evaluations: Annotated[int, "Frequency responses computed."]
     work: Annotated[FloatOrNaN, "What the search cost in all, in frequency responses."]
-    seconds: Annotated[float, "Time in all [s]."]
+    seconds: Annotated[float, "Time in all [s]."] = 0.0
 
     @property
     def scene(self) -> str:
@@ -204,7 +367,7 @@ class DesignResult(MadeOfResponses, Drawn):
         held = self.held_by
         if held is None or self.evaluation is None:
             return math.nan
-        parts = dict(known_parts(self.evaluation))
+        parts = dict(self.evaluation.known_parts)
         return parts[held.case].error_estimate if held.case in parts else math.nan
 
     @property
@@ -225,7 +388,7 @@ class DesignResult(MadeOfResponses, Drawn):
         It is neither where the response of every case is highest at an end of its band: what is least there
         is no peak.
         """
-        branches = () if self.evaluation is None else tuple(over_bands(self.evaluation).values())
+        branches = () if self.evaluation is None else tuple(self.evaluation.over_bands.values())
         if branches and all(map(on_demand("solver.response.plausibility:is_band_end"), branches)):
             return Certainty.BAND_END
         followed = self.method is Method.TRACKED and bool(self.basins) and self.basins[0].proven
@@ -235,7 +398,7 @@ class DesignResult(MadeOfResponses, Drawn):
     def of_scene(self) -> tuple[Note, ...]:
         """What of the scene is hardly meant, with the values of the optimum."""
         whole = self.evaluation
-        scenes = [self.problem.scene] if whole is None else [one.scene for one in over_bands(whole).values()]
+        scenes = [self.problem.scene] if whole is None else [one.scene for one in whole.over_bands.values()]
         return notes_of_all(map(on_demand("solver.response.plausibility:plausibility"), scenes))
 
     @property
@@ -337,22 +500,34 @@ class DesignResult(MadeOfResponses, Drawn):
 
     def known_parts(self) -> Iterable[Known]:
         """The response of each case over its band."""
-        return () if self.evaluation is None else [known for _, known in known_parts(self.evaluation)]
+        return () if self.evaluation is None else [known for _, known in self.evaluation.known_parts]
 
     def to_json(self) -> dict[str, Any]:
         """Return the result as one JSON object."""
         tried = [one for one in self.history if one.good and one.peaks]
         return self._json(
-            conditions=None if self.conditions is None else conditions_json(self.conditions),
-            looked_at=[looked_json(one) for one in self.looked_at if one.good],
+            looked_at=[_looked_json(one) for one in self.looked_at if one.good],
             newton_iterations=sum(branch.newton_iterations for branch in self.sweeps),
             tried=[{"values": e.values, "peak": e.peaks[0].value, "at": e.peaks[0].at_hz} for e in tried],
             broken=[
                 {**row.to_json(), "by": json_number(row.told - (row.bound_told or 0.0))}
                 for row in self.broken
             ],
-            **self.stability.to_json(), **evaluation_json(self.evaluation),
+            **self.stability.to_json(),
+            **(_NOTHING if self.evaluation is None else self.evaluation.to_json()),
         )  # fmt: skip
+
+
+_NOTHING: dict[str, Any] = {"peaks": [], "bands": [], "objective": None, "rows": [], "errors": []}
+
+
+def _looked_json(one: DesignEvaluation) -> dict[str, object]:
+    """Return a design of the look over the whole range."""
+    kept = all(row.bound is None or row.value <= row.bound for row in one.rows)
+    return {
+        "values": dict(one.values), "objective": json_number(one.objective_told), "feasible": kept,
+        "n_harmonics": one.harmonics or None,
+    }  # fmt: skip
 
 
 def at_limit(row: CriterionRow) -> bool:

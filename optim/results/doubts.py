@@ -6,13 +6,12 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from optim.results.design_parts import Checked
-from optim.results.json import known_parts
 from solver.results.known import Known
 from solver.results.notes import flag_words, notes_of_all
 
 if TYPE_CHECKING:
     from optim.criteria.constraint_rows import DesignEvaluation
+    from optim.results.design_result import Checked
 
 DOUBTFUL = 0.1  # estimated error of a peak, relative, from which its harmonics are too few
 WELL_KNOWN = 0.05  # relative error of the highest peak up to which a design may be called the best
@@ -44,7 +43,7 @@ def doubts_of(
         *_checked(checked, optimum, feasible=feasible),
         *open_peaks(evaluation),
         *_flags(evaluation),
-        *(note.words for note in notes_of_all(known.notes for _, known in known_parts(evaluation))),
+        *(note.words for note in notes_of_all(known.notes for _, known in evaluation.known_parts)),
     )
 
 
@@ -68,7 +67,7 @@ def _few_harmonics(evaluation: DesignEvaluation, harmonics: int) -> list[str]:
     return [
         f"too few harmonics: the estimated error of the peak of {case} is {_share(known)} with {harmonics}: "
         "ask for more harmonics"
-        for case, known in known_parts(evaluation)
+        for case, known in evaluation.known_parts
         if known.relative > WELL_KNOWN
     ]
 
@@ -96,7 +95,7 @@ def _checked(checked: Sequence[Checked], optimum: Mapping[str, float], *, feasib
 def _flags(evaluation: DesignEvaluation) -> list[str]:
     """The flags of the responses and the rows, each once."""
     own = (flag for one in evaluation.responses for flag in one.branch.flags)
-    at_peaks = (flag for _, known in known_parts(evaluation) for flag in known.flags)
+    at_peaks = (flag for _, known in evaluation.known_parts for flag in known.flags)
     of_rows = (flag for row in evaluation.rows for flag in row.flags)
     return flag_words(dict.fromkeys((*own, *at_peaks, *of_rows)))
 

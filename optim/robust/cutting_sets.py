@@ -9,13 +9,12 @@ from typing import Annotated
 
 from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.peak_criterion import PEAK
-from optim.methods.kkt import Local, is_flat
+from optim.methods.linearised import Local, is_flat
 from optim.methods.surrogate import quasi_random
 from optim.problem.design_problem import Problem
 from optim.problem.uncertainty_set import Scenario
 from optim.problem.variables import scaled, unscaled
-from optim.results.design_parts import SAME_PLACE
-from optim.results.design_result import DesignResult
+from optim.results.design_result import SAME_PLACE, DesignResult
 from optim.robust.robust_result import Cut, RobustStatus
 from optim.robust.robust_search import RobustSearch
 from optim.robust.scenarios import Outcome, number_of

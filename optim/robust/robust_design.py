@@ -20,19 +20,15 @@ from typing import TYPE_CHECKING, Unpack
 from optim.criteria.band import BAND
 from optim.criteria.criterion import CriterionRow
 from optim.criteria.peak_criterion import PEAK
-from optim.errors import DesignError
 from optim.methods.enough_harmonics import most_harmonics
 from optim.methods.evaluator import SearchStoppedError
-from optim.methods.kkt import KEPT
-from optim.problem.design_problem import pose
+from optim.methods.linearised import KEPT
+from optim.problem.checks import Aim, DesignError, Method, is_number, whole, word
+from optim.problem.design_problem import Limit, pose
 from optim.problem.problem_keys import FEWEST_SAMPLES, OPTIONS, QUANTILE, SEED, DesignKeys, keywords
-from optim.problem.problem_numbers import is_number, whole, word
-from optim.problem.typed import Limit, with_limits
 from optim.problem.uncertainty_input import check_settings, read_uncertain
 from optim.problem.uncertainty_set import Scenario
-from optim.problem.words import Aim, Method
-from optim.results.design_parts import OnBest
-from optim.results.design_result import DesignResult, DesignStatus
+from optim.results.design_result import DesignResult, DesignStatus, OnBest
 from optim.results.doubts import WELL_KNOWN
 from optim.robust.cutting_sets import CLOSED, SearchProgress, cutting_sets, sampled
 from optim.robust.robust_result import RobustResult, RobustStatus, Side, Spread
@@ -162,7 +158,7 @@ def robust_design(
         An argument that is no key.
     """
     begun = clock()
-    posed = pose(scene, **with_limits(problem, limits))
+    posed = pose(scene, limits, **problem)
     if posed.method is Method.PERFORMANCE_CURVE:
         raise DesignError("method", posed.method.value, "must be another one: a curve knows no uncertainty")
     over = read_uncertain(scene, posed.variables, uncertain, posed.cases)

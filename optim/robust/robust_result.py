@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 
 from optim.criteria.peak_criterion import PEAK
-from optim.problem.words import Aim
+from optim.problem.checks import Aim
 from optim.results.design_result import DesignStatus
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn, MadeOfResponses
@@ -22,7 +22,7 @@ from solver.results.told import Piece, json_number
 from solver.results.views import Views
 
 if TYPE_CHECKING:
-    from optim.criteria.linearised import Conditions
+    from optim.methods.linearised import Conditions
     from optim.problem.design_problem import Problem
     from optim.problem.uncertainty_set import Scenario, UncertainSet
     from optim.results.design_result import DesignResult

@@ -9,17 +9,14 @@ from functools import partial
 from typing import Any
 
 from optim.criteria.constraint_rows import DesignEvaluation
-from optim.criteria.evaluation import natural_scales
-from optim.criteria.linearised import Model
 from optim.methods.evaluator import SearchStoppedError
-from optim.methods.kkt import KEPT, Local, of_limits
+from optim.methods.linearised import KEPT, Local, Model, of_limits
 from optim.methods.minimax import REMEMBERED, minimax_search
+from optim.problem.checks import Aim
 from optim.problem.design_problem import Problem
 from optim.problem.uncertainty_set import Scenario, UncertainSet
 from optim.problem.variables import BoundedVariable
-from optim.problem.words import Aim
-from optim.results.design_parts import NOMINAL, BestSoFar, OnBest
-from optim.results.design_result import DesignStatus
+from optim.results.design_result import NOMINAL, BestSoFar, DesignStatus, OnBest
 from optim.robust.scenarios import Outcome, aim_model, known_in, outcome, together
 from optim.robust.worst_case import Aspect, Finding, pessimise
 from solver.results.known import Known
@@ -45,7 +42,7 @@ class RobustSearch:
         should_stop: Callable[[], bool] | None = None, on_best: OnBest = None,
     ) -> None:  # fmt: skip
         self.problem, self.uncertain, self.aim, self.quantile = problem, uncertain, aim, quantile
-        self.scales = natural_scales(problem)
+        self.scales = problem.scales
         self.responses = 0
         self._on_progress, self._should_stop = on_progress, should_stop
         self._outcomes: dict[Key, Outcome] = {}

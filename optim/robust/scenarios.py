@@ -13,13 +13,12 @@ import numpy as np
 from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.criterion import Criterion, CriterionRow
 from optim.criteria.evaluation import Judge, effects_of, evaluate, ranges_of
-from optim.criteria.linearised import PENALTY, Model, model_of
+from optim.methods.linearised import PENALTY, Model, model_of
 from optim.problem.cases import LoadCase
+from optim.problem.checks import Aim
 from optim.problem.design_problem import Problem
 from optim.problem.uncertainty_set import Coordinate, Scenario
 from optim.problem.variables import BoundedVariable, Real, parameter_values
-from optim.problem.words import Aim
-from optim.results.json import over_bands
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.walk import ContinuationSettings
@@ -148,7 +147,7 @@ class _Chain:
             )  # fmt: skip
             return [peaks.highest]
         evaluation = evaluate(problem, values, gradients=False, should_stop=should_stop)
-        return [branch.known for branch in over_bands(evaluation).values()]
+        return [branch.known for branch in evaluation.over_bands.values()]
 
     def _posed(self) -> Problem:
         """Return the problem of the case in the scenario, every path a variable."""
@@ -271,7 +270,7 @@ def aim_model(
       It is the quantile itself that falls, not a smoothed one or the CVaR above it, and its slope at a smooth
       point is the exact one of the order statistic.
 
-    See `optim.criteria.linearised.model_of` for the rest.
+    See `optim.methods.linearised.model_of` for the rest.
     """
 
     def worst(evaluation: DesignEvaluation) -> Model:

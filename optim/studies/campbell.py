@@ -12,9 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from optim.errors import DesignError
 from optim.problem.cases import with_engine_order
-from optim.problem.problem_numbers import number_pair
+from optim.problem.checks import DesignError, number_pair
 from optim.studies.crossings import CampbellDiagram, CampbellStatus, Crossing, OrderResponse, Ranges
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace

@@ -19,15 +19,13 @@ from scipy.optimize import linprog
 
 from optim.criteria.band import BAND
 from optim.criteria.constraint_rows import DesignEvaluation
-from optim.criteria.linearised import ACTIVE, Model, bounds_held
 from optim.criteria.peak_criterion import PEAK
-from optim.errors import DesignError
-from optim.methods.enough_harmonics import honest
+from optim.methods.enough_harmonics import only_if_known
 from optim.methods.evaluator import DesignSearch, SearchStoppedError
-from optim.methods.kkt import Local
-from optim.problem.design_problem import Method, Problem, pose
+from optim.methods.linearised import ACTIVE, Local, Model, bounds_held
+from optim.problem.checks import DesignError
+from optim.problem.design_problem import Limit, Method, Problem, pose
 from optim.problem.problem_keys import FEWEST_POINTS, POINTS, FrontKeys, keywords
-from optim.problem.typed import Limit, with_limits
 from optim.problem.variables import BoundedVariable, scaled, unscaled
 from optim.results.design_result import DesignResult, DesignStatus
 from optim.search import judge, local_search_of, solve_problem
@@ -86,7 +84,7 @@ def pareto_front(
         An argument that is no key.
     """
     begun = clock()
-    posed = replace(pose(scene, **with_limits(problem, limits)), keeps_measure=True)
+    posed = replace(pose(scene, limits, **problem), keeps_measure=True)
     if isinstance(points, bool) or not isinstance(points, int) or points < FEWEST_POINTS:
         raise DesignError("points", points, f"must be a whole number >= {FEWEST_POINTS}")
     if posed.method is Method.PERFORMANCE_CURVE:
@@ -216,7 +214,7 @@ class _Front:
             history=tuple(search.history[1:]),
             evaluations=len(search.history) - 1, work=float(len(search.history) - 1), seconds=0.0,
         )  # fmt: skip
-        self.found.append(ParetoPoint.of(honest(result), _slope(search, local, width)))
+        self.found.append(ParetoPoint.of(only_if_known(result), _slope(search, local, width)))
 
     def _searched(
         self,

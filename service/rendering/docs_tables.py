@@ -20,8 +20,8 @@ from optim.criteria.key import Key, Option
 from optim.identification.data.measured import data_kinds
 from optim.identification.data.measured_units import known_units
 from optim.identification.readers.data_readers import data_formats
+from optim.problem.checks import MethodWord, ScalingWord
 from optim.problem.problem_keys import OPTIONS, ROBUST, CaseRequest, DesignKeys, FrontKeys, options
-from optim.problem.words import MethodWord, ScalingWord
 from service.jobs.common.scene_requests import HarmonicRequest, SceneRequest
 from service.jobs.kind_registry import ABOUT_THE_JOB, JobKind, JobRequest, Registry
 from service.jobs.kinds import SHIPPED
@@ -42,7 +42,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Literal, TypedDict
 
-from optim.problem.words import Method, MethodWord, ScalingWord
+from optim.problem.checks import Method, MethodWord, ScalingWord
 '''
 _INDENT, _WIDTH = " " * 4, 110
 _NUMBERS = {"number": "float", "integer": "int", "boolean": "bool", "string": "str", "null": "None"}

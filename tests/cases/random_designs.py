@@ -11,7 +11,7 @@ from scipy.linalg import eigvalsh
 
 import solver
 from optim.criteria.constraint_rows import DesignEvaluation
-from optim.criteria.evaluation import evaluate, natural_scales
+from optim.criteria.evaluation import evaluate
 from optim.problem.design_problem import Problem, pose
 from optim.problem.variables import unscaled
 from solver import Scene
@@ -166,7 +166,7 @@ class Brute:
 
 def rank(problem: Problem, evaluation: DesignEvaluation) -> tuple[float, float]:
     """What designs are compared by: violation of the limits, then the objective."""
-    violation = max(evaluation.violation(natural_scales(problem)), 0.0)
+    violation = max(evaluation.violation(problem.scales), 0.0)
     return (0.0 if violation <= KEPT else violation), evaluation.objective
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import optim
 import solver
-from optim.results.design_parts import BestSoFar
+from optim.results.design_result import BestSoFar
 
 TRACKED: dict[str, Any] = {"variables": {"damper.N0": (20, 500)}}
 SEARCHED: dict[str, Any] = {

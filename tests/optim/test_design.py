@@ -9,7 +9,7 @@ import pytest
 import optim
 import solver
 from optim.criteria.evaluation import evaluate
-from optim.errors import DesignError
+from optim.problem.checks import DesignError
 from optim.problem.design_problem import pose
 from optim.results.design_result import DesignStatus
 

@@ -7,7 +7,7 @@ import pytest
 
 import optim
 import solver
-from optim.errors import DesignError
+from optim.problem.checks import DesignError
 from optim.problem.design_problem import Method
 from optim.results.design_result import DesignResult, DesignStatus
 

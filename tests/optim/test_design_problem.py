@@ -10,7 +10,7 @@ from optim.criteria.criterion_registry import criteria
 from optim.criteria.evaluation import evaluate
 from optim.criteria.forbidden import FORBIDDEN
 from optim.criteria.peak_criterion import PEAK
-from optim.errors import DesignError
+from optim.problem.checks import DesignError
 from optim.problem.design_problem import pose
 from optim.results.design_result import DesignStatus
 

@@ -8,7 +8,7 @@ import pytest
 
 import optim
 import solver
-from optim.errors import DesignError
+from optim.problem.checks import DesignError
 from optim.results.design_result import DesignStatus
 from solver.balance.balance import build
 from solver.balance.workspace import Workspace

@@ -15,7 +15,7 @@ from optim.criteria.mass import MASS
 from optim.criteria.quality import QUALITY
 from optim.criteria.running_speeds import RUNNING
 from optim.criteria.wear_rate import WEAR_RATE
-from optim.errors import DesignError
+from optim.problem.checks import DesignError
 from optim.problem.design_problem import pose
 from optim.problem.issues import problem_issues
 from solver.modes.at_amplitudes import mode_at_amplitudes

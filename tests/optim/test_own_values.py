@@ -7,7 +7,7 @@ import pytest
 
 import optim
 import solver
-from optim.errors import DesignError
+from optim.problem.checks import DesignError
 from optim.problem.design_problem import pose
 from optim.problem.issues import problem_issues
 from optim.problem.uncertainty_input import read_uncertain

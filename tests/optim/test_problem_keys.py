@@ -8,12 +8,11 @@ import pytest
 
 import optim
 import solver
-from optim.errors import DesignError
+from optim.problem.checks import Aim, AimWord, DesignError, Method, MethodWord, Scaling, ScalingWord
 from optim.problem.design_problem import pose
 from optim.problem.issues import problem_issues, uncertainty_issues
 from optim.problem.keyword_types import DesignKeywords, FrontKeywords
 from optim.problem.problem_keys import OPTIONS, ROBUST, DesignKeys, FrontKeys, options
-from optim.problem.words import Aim, AimWord, Method, MethodWord, Scaling, ScalingWord
 
 TWO = solver.load_scene("two-dof")
 # `limits` sets keys that have words of their own, with types; it is none itself.

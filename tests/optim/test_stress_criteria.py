@@ -13,7 +13,7 @@ import solver
 from optim.criteria.evaluation import evaluate
 from optim.criteria.stress import STRESS
 from optim.criteria.utilisation import UTILISATION
-from optim.errors import DesignError
+from optim.problem.checks import DesignError
 from optim.problem.design_problem import pose
 from optim.results.design_result import DesignStatus
 from solver.balance.kernels.haigh import utilisation

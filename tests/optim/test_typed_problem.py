@@ -7,9 +7,8 @@ import pytest
 import optim
 import solver
 from optim import Case, DesignError, Limit
-from optim.problem.design_problem import pose
+from optim.problem.design_problem import pose, with_limits
 from optim.problem.problem_keys import CaseRequest
-from optim.problem.typed import with_limits
 
 DISK = {"shroud.N0": (20.0, 3000.0)}
 

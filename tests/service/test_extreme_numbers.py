@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from optim.errors import DataError
+from optim.problem.checks import DataError
 from service.errors import InvalidRequestError
 from service.jobs.job_parts import PartStoppedError
 from service.jobs.kind_registry import ABOUT_THE_JOB

@@ -14,10 +14,10 @@ from typing import Annotated
 
 import numpy as np
 
-from optim.errors import DataError
 from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
 from optim.identification.data.measured_table import Table, check_monotone
 from optim.identification.data.measured_units import Dimension
+from optim.problem.checks import DataError
 from optim.problem.variables import Real
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects

@@ -8,9 +8,9 @@ from typing import Annotated, ClassVar, Self
 
 import numpy as np
 
-from optim.errors import DataError
 from optim.identification.data.measured import MeasuredRows
 from optim.identification.data.measured_table import Table, check_sign
+from optim.problem.checks import DataError
 from optim.problem.variables import Real
 from solver.results.told import json_numbers
 from solver.scene.parameter_paths import AMPLITUDE

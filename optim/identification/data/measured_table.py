@@ -11,8 +11,8 @@ from typing import Annotated
 
 import numpy as np
 
-from optim.errors import DataError
 from optim.identification.data.measured_units import Unit
+from optim.problem.checks import DataError
 from optim.problem.variables import Real
 from solver.errors import Place
 from solver.jit.fourier import Integer

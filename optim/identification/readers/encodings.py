@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 from pathlib import Path
 
-from optim.errors import DataError
+from optim.problem.checks import DataError
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from optim.errors import DataError
 from optim.identification.data.measured import known_columns
 from optim.identification.data.measured_units import Dimension, Scaling, known_units, no_motion, unit_of
 from optim.identification.readers.number_texts import is_number
 from optim.identification.readers.text_layout import Layout, heading_unit
+from optim.problem.checks import DataError
 
 LEFT_OUT = ""
 FORCE = "excitation.amplitude"

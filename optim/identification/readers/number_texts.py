@@ -14,7 +14,7 @@ from functools import cache
 
 import numpy as np
 
-from optim.errors import DataError
+from optim.problem.checks import DataError
 from optim.problem.variables import Real
 from solver.jit.fourier import Complex
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from optim.errors import DataError
 from optim.identification.data.measured_table import Table
 from optim.identification.readers.data_readers import DataFormat, read_head, table_of
+from optim.problem.checks import DataError
 from optim.problem.variables import Real
 from solver.errors import MissingExtraError
 

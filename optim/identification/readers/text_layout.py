@@ -9,10 +9,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
-from optim.errors import DataError
 from optim.identification.data.measured_table import split_head
 from optim.identification.data.measured_units import any_unit
 from optim.identification.readers.number_texts import decimal_of, is_number
+from optim.problem.checks import DataError
 
 SEPARATORS = (";", "\t", ",", "|")
 _LOOKED_AT = 200  # lines

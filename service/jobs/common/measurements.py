@@ -59,10 +59,10 @@ def look_at(scene: Scene, files: Sequence[Mapping[str, str]]) -> dict[str, Any]:
     and `columns` with `heading`, `cells` of the first rows, `quantity` (empty: left out) and `unit`;
     `quantities` with the `units` that each may be in; `issues` as of `read_measurements`.
     """
-    from optim.errors import DataError
     from optim.identification.data.measured import known_columns
     from optim.identification.readers.headings import FORCE, guesses, units_for
     from optim.identification.readers.text_layout import layout_of
+    from optim.problem.checks import DataError
 
     paths = frozenset(scene.parameter_paths())
     found, issues = [], []

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from optim.problem.default_variable import ABOVE, BELOW
+from optim.problem.problem_keys import ABOVE, BELOW
 from solver.errors import SettingError
 from solver.scene.scene import AnyContact, Scene
 

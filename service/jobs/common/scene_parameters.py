@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
-from optim.problem.default_variable import default_variable
+from optim.problem.problem_keys import default_variable
 from service.jobs.common.proposals import StudyProposal, around, design_bounds, proposals
 from service.jobs.common.scene_parts import JointAnswer, joints
 from solver.contacts.laws.contact_parts import Span

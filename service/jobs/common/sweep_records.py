@@ -127,10 +127,9 @@ def design_record(result: DesignResult) -> DesignRecord:
     problem, evaluation, peak = result.problem, result.evaluation, result.peak
     feasible = False
     if evaluation is not None and evaluation.good:
-        from optim.criteria.evaluation import natural_scales
-        from optim.methods.kkt import KEPT
+        from optim.methods.linearised import KEPT
 
-        feasible = evaluation.violation(natural_scales(problem)) <= KEPT
+        feasible = evaluation.violation(problem.scales) <= KEPT
     return _record(
         result,
         method=result.method.value,

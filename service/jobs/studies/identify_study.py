@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from pydantic import BeforeValidator, Field
 
 from optim.criteria.key import LARGEST, Pair, Share
+from optim.problem.checks import ScalingWord
 from optim.problem.problem_keys import MAX_VARIABLES, VariableName
-from optim.problem.words import ScalingWord
 from service.jobs.common.result_models import KindResult, Table, answered
 from service.jobs.common.scene_requests import HarmonicRequest, Number, ParameterPath
 from service.jobs.common.sizes import balance_issues

@@ -12,16 +12,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
-from optim.criteria.evaluation import evaluate, natural_scales
+from optim.criteria.evaluation import evaluate
 from optim.criteria.mass import MASS
-from optim.errors import DesignError
-from optim.methods.kkt import KEPT
+from optim.problem.checks import DesignError
+from optim.methods.linearised import KEPT
 from optim.problem.cases import refuse_displaced
 from optim.problem.design_problem import Problem, pose
 from optim.problem.variables import NOTHING, parameter_values
-from optim.problem.words import Method
+from optim.problem.checks import Method
 from optim.results.design_result import DesignResult, DesignStatus
-from optim.results.design_parts import CatalogueOption, OptionStatus
+from optim.results.design_result import CatalogueOption, OptionStatus
 from optim.search import solve_problem
 from solver.errors import Place, at
 from solver.jit.timer import clock
@@ -165,7 +165,7 @@ def _searched(problem: Problem, on_progress: OnProgress, should_stop: ShouldStop
     begun = clock()
     only = evaluate(problem, {}, gradients=False, should_stop=should_stop)
     stopped = not only.good and should_stop is not None and should_stop()
-    kept = only.good and only.violation(natural_scales(problem)) <= KEPT
+    kept = only.good and only.violation(problem.scales) <= KEPT
     status = DesignStatus.OPTIMAL if kept else DesignStatus.INFEASIBLE
     if not only.good:
         status = DesignStatus.STOPPED if stopped else DesignStatus.NO_RESPONSE
@@ -180,7 +180,7 @@ def _status(found: DesignResult) -> OptionStatus:
     """Return what became of an option that was searched."""
     if found.evaluation is None or not found.evaluation.good:
         return OptionStatus.STOPPED if found.status is DesignStatus.STOPPED else OptionStatus.UNKNOWN
-    kept = found.evaluation.violation(natural_scales(found.problem)) <= KEPT
+    kept = found.evaluation.violation(found.problem.scales) <= KEPT
     return OptionStatus.FEASIBLE if kept else OptionStatus.INFEASIBLE
 
 

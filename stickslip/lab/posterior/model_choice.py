@@ -16,12 +16,12 @@ from typing import Annotated, ClassVar
 import numpy as np
 from scipy.special import logsumexp
 
-from optim.errors import DesignError
+from optim.problem.checks import DesignError
 from stickslip.lab.posterior.posterior import posterior
 from stickslip.lab.posterior.posterior_result import Posterior
 from stickslip.lab.posterior.sampling import SAMPLING, Sampling
 from optim.identification.reading import Given
-from optim.problem.problem_numbers import is_number
+from optim.problem.checks import is_number
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn
 from solver.results.told import Piece

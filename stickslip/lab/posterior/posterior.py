@@ -9,7 +9,7 @@ from typing import Annotated
 
 import numpy as np
 
-from optim.errors import DesignError
+from optim.problem.checks import DesignError
 from optim.identification.fit import LEAST_LEVEL, LocalFit, Noise, Runs, search
 from optim.identification.identify import misfit_of
 from optim.identification.information import information

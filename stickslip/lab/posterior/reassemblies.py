@@ -22,7 +22,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from scipy.optimize import minimize
 
-from optim.errors import DesignError
+from optim.problem.checks import DesignError
 from stickslip.lab.posterior.importance import TRUSTED, importance
 from stickslip.lab.posterior.posterior import posterior
 from stickslip.lab.posterior.posterior_result import Marginal, Posterior

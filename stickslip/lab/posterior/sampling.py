@@ -7,10 +7,10 @@ from typing import Annotated
 
 import numpy as np
 
-from optim.errors import DesignError
+from optim.problem.checks import DesignError
 from optim.identification.fit import STARTS
 from optim.identification.identify import check_fit
-from optim.problem.problem_numbers import is_number
+from optim.problem.checks import is_number
 from solver.wording import documented
 
 SAMPLERS = ("auto", "importance", "nuts")

@@ -124,7 +124,7 @@ class PosteriorStudy(Measured):
 
     def read_issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the whole description, of every model."""
-        from optim.errors import DesignError
+        from optim.problem.checks import DesignError
 
         found = super().read_issues(scene)
         for name, one in (self.models or {}).items():
@@ -194,7 +194,7 @@ def _resolve(request: PosteriorStudy, source: SceneSource) -> Resolved:
 
 def _model(name: str, given: Any) -> tuple[Scene, Mapping[str, Any]]:
     """Return scene and unknowns of another model."""
-    from optim.errors import DesignError
+    from optim.problem.checks import DesignError
 
     if not isinstance(given, Mapping) or not {"scene", "unknowns"} <= given.keys():
         raise DesignError(("models", name), given, "must be a table with `scene`, `unknowns`, perhaps `set`")
@@ -212,7 +212,7 @@ def _scene_of(given: Mapping[str, Any]) -> Scene:
 
 def _by_assembly(data: list[Any], assemblies: list[int] | None) -> list[list[Any]]:
     """Return the data of each assembly; without numbers each table is one of its own."""
-    from optim.errors import DesignError
+    from optim.problem.checks import DesignError
 
     numbers = list(range(len(data))) if assemblies is None else assemblies
     if len(numbers) != len(data):

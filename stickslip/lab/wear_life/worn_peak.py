@@ -90,8 +90,8 @@ def _when(hours: float, asked: WornLife) -> str:
 
 def _read(asked: CriterionContext) -> WornLife:
     """The life, checked against the scene."""
-    from optim.errors import DesignError
-    from optim.problem.problem_numbers import positive
+    from optim.problem.checks import DesignError
+    from optim.problem.checks import positive
     from solver.errors import SettingError
     from stickslip.lab.wear_life.least_worn_peak import checked_factors, checked_since
     from stickslip.lab.wear_life.life import course_of

@@ -12,8 +12,8 @@ import pyuff
 
 import optim
 import solver
-from optim.errors import DataError
 from optim.identification.reading import read_data
+from optim.problem.checks import DataError
 
 SCENE = solver.load_scene("two-dof")
 HEAD = "# excitation.amplitude = 50\nfrequency,amplitude [mm],phase [rad]\n"

@@ -6,7 +6,7 @@ import pytest
 
 import optim
 import solver
-from optim.errors import DesignError
+from optim.problem.checks import DesignError
 from stickslip.lab.catalogue.catalogue import OptionStatus, catalogue
 from solver.errors import SettingError
 

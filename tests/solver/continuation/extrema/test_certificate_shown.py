@@ -6,7 +6,7 @@ import pytest
 
 import optim
 import solver
-from optim.methods.afterwards import looked_after
+from optim.methods.plateau import with_plateau
 from optim.results.design_result import DesignStatus
 from optim.views.tables import design as designs
 from optim.views.tables import studies
@@ -77,7 +77,7 @@ def test_an_optimum_is_claimed_only_of_what_is_known(capsys):
     assert not any("between its points" in words for words in found.warnings)
     responses = tuple(replace(one, branch=doubtful(one.branch)) for one in found.evaluation.responses)
     evaluation = replace(found.evaluation, responses=responses)
-    again = looked_after(replace(found, evaluation=evaluation, status=DesignStatus.AT_BOUND), None)
+    again = with_plateau(replace(found, evaluation=evaluation, status=DesignStatus.AT_BOUND), None)
     assert again.status is DesignStatus.LOCAL
     assert not again.reached
     assert any(WHY in words for words in again.warnings)

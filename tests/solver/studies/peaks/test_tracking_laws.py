@@ -10,7 +10,7 @@ from peak_cases import highest
 from space_cases import SPACE, in_space
 
 import optim
-from optim.errors import DesignError
+from optim.problem.checks import DesignError
 from solver.errors import SettingError
 from solver.scene.scene import Scene
 from solver.studies.peaks.minimise_peak import least_peak

@@ -1,4 +1,4 @@
-"""First-order model of a design in scaled variables, and the optimality conditions it has to meet.
+"""First-order model of a design in scaled variables, the optimality conditions, where a local search ended.
 
 Objective rows are relative to a scale, so that 1 is the height of the design a search began with; limited
 rows are relative excesses over their bounds.
@@ -6,16 +6,18 @@ rows are relative excesses over their bounds.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from scipy.optimize import nnls
 
 from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.criterion import Criterion, CriterionRow
+from optim.problem.design_problem import Method, Problem
 from optim.problem.variables import BoundedVariable, Real, scaled, slopes
+from optim.results.design_result import Conditions, DesignResult, DesignStatus, LocalOptimum
 
 PENALTY = 1e4  # the largest exact penalty on the largest relative excess over a bound
 ACTIVE = 1e-6  # relative distance from the largest row, or from its bound, within which a row is active
@@ -117,26 +119,6 @@ def model_of(
         by_z=by_z, bends=np.array([v.bend(evaluation.values[v.name]) for v in variables]), unit=scale,
         units=np.array(units),
     )  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Conditions:
-    """The Karush-Kuhn-Tucker conditions of a design: which rows hold it, with which force."""
-
-    rows: Annotated[
-        tuple[tuple[CriterionRow, float], ...],
-        "Active rows with their multipliers: objective rows of one quantity sum to 1; those of limited "
-        "rows say by how much of the objective's scale the optimum falls for a relative relief of the "
-        "bound.",
-    ]
-    bounds: Annotated[
-        tuple[tuple[str, str, float], ...],
-        "Variable, ``lower`` or ``upper``, and multiplier, of the variables on a bound.",
-    ]
-    residual: Annotated[
-        float, "Largest component of the gradient of the Lagrangian, relative objective per scaled variable."
-    ]
-    violation: Annotated[float, "Largest relative excess over a bound."]
 
 
 def conditions(
@@ -279,3 +261,111 @@ class _Lines:
             if missed <= SAME * abs(0.5 * float((its - slope) @ back)) + ROUNDING * abs(value):
                 return True
         return False
+
+
+Evaluate = Callable[[Mapping[str, float]], DesignEvaluation]
+ModelOf = Callable[[DesignEvaluation], Model]
+
+KKT_TOLERANCE = 1e-3  # relative objective per scaled variable
+KEPT = 1e-6  # relative excess over a bound up to which it counts as kept
+FLAT_SLOPE = 1e-9  # relative objective per scaled variable below which there is nothing to choose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Local:
+    """Where a local search ended."""
+
+    evaluation: Annotated[DesignEvaluation, "The best design."]
+    merit: Annotated[float, "Its objective, with the penalty on the limits it does not keep."]
+    settled: Annotated[
+        bool,
+        "Whether the first-order conditions hold: of the objective, or, if limits are not kept, of the "
+        "largest excess over them.",
+    ]
+    feasible: Annotated[bool, "Whether the limits are kept."]
+    conditions: Annotated[Conditions, "Multipliers and residual."]
+    standing: Annotated[tuple[float, float], "What designs are compared by; see `standing`."]
+
+    @property
+    def optimum(self) -> LocalOptimum:
+        """It as results tell it."""
+        return optimum_at(self.evaluation, settled=self.settled, feasible=self.feasible)
+
+
+def optimum_at(evaluation: DesignEvaluation, *, settled: bool, feasible: bool) -> LocalOptimum:
+    """Return a design whose responses were computed as a local optimum."""
+    return LocalOptimum(
+        values=dict(evaluation.values), peak=evaluation.peaks[0].value, objective=evaluation.objective_told,
+        settled=settled, feasible=feasible, proven=True,
+    )  # fmt: skip
+
+
+def standing(model: Model) -> tuple[float, float]:
+    """Return what designs are compared by: the excess over the limits that are not kept, then the objective.
+
+    No penalty is large enough for every limit: a design that keeps all of them goes before any that does not.
+    """
+    violation = model.violation
+    return (0.0 if violation <= KEPT else violation), model.objective
+
+
+def ended(here: DesignEvaluation, model: Model, variables: Sequence[BoundedVariable]) -> Local:
+    """Return the end of a search at a design."""
+    feasible = model.violation <= KEPT
+    found = conditions(model, variables, feasibility=not feasible)
+    return Local(
+        evaluation=here, merit=model.merit, settled=found.residual <= KKT_TOLERANCE, feasible=feasible,
+        conditions=found, standing=standing(model),
+    )  # fmt: skip
+
+
+HELD = 1e-7  # multiplier of a bound, relative objective per scaled variable, from which it holds the design
+
+
+def settled_status(found: Conditions) -> DesignStatus:
+    """Return whether a settled design is held by the bound of a variable."""
+    held = any(multiplier > HELD for _, _, multiplier in found.bounds)
+    return DesignStatus.AT_BOUND if held else DesignStatus.OPTIMAL
+
+
+def of_one(
+    problem: Problem, method: Method, status: DesignStatus, evaluation: DesignEvaluation | None, **more: Any
+) -> DesignResult:  # fmt: skip
+    """Return the result of a method without a local search; its optimum is judged like that of any."""
+    found = None
+    if evaluation is not None and evaluation.good:
+        model = model_of(evaluation, problem.variables, evaluation.objective, problem.scales)
+        found = conditions(model, problem.variables)
+        status = settled_status(found) if status is DesignStatus.OPTIMAL else status
+    history = () if evaluation is None else (evaluation,)
+    return DesignResult(
+        problem=problem, method=method, status=status, evaluation=evaluation, conditions=found,
+        history=history, **more,
+    )  # fmt: skip
+
+
+def is_flat(model: Model) -> bool:
+    """Return whether no row depends on any variable."""
+    both = np.concatenate([model.slopes.reshape(-1), model.excess_slopes.reshape(-1)])
+    return bool(np.all(np.abs(both) <= FLAT_SLOPE))
+
+
+def of_limits(model: Model) -> Model:
+    """Return the model whose objective is the largest relative excess over a limit, counted from 1."""
+    rows = tuple(
+        replace(row, weight=model.unit / unit)
+        for row, unit in zip(model.limited, model.units.tolist(), strict=True)
+    )
+    return replace(
+        without_limits(model), rows=rows, heights=1.0 + model.excess, slopes=model.excess_slopes,
+        groups=np.zeros(model.excess.size),
+    )  # fmt: skip
+
+
+def without_limits(model: Model) -> Model:
+    """Return the model of what is minimised alone."""
+    none = np.zeros(0)
+    return replace(model, limited=(), excess=none, excess_slopes=np.zeros((0, model.z.size)), units=none)
+
+
+LocalSearch = Callable[[Evaluate, tuple[BoundedVariable, ...], DesignEvaluation, ModelOf], Local]
