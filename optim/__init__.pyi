@@ -31,11 +31,11 @@ from .robust.robust_design import robust_design as robust_design
 from .search import design as design
 from .studies.campbell import campbell_diagram as campbell_diagram, forbidden_hz as forbidden_hz
 from stickslip.lab.catalogue.catalogue import CatalogueResult as CatalogueResult, catalogue as catalogue
-from .studies.crossings import CampbellDiagram as CampbellDiagram, CampbellStatus as CampbellStatus
+from .results.studies_result import CampbellDiagram as CampbellDiagram, CampbellStatus as CampbellStatus
 from .studies.elasticities import sensitivities as sensitivities
 from .studies.pareto import pareto_front as pareto_front
-from .studies.pareto_result import ParetoResult as ParetoResult, ParetoStatus as ParetoStatus
-from .studies.sensitivity_result import (
+from .results.studies_result import ParetoResult as ParetoResult, ParetoStatus as ParetoStatus
+from .results.studies_result import (
     SensitivityResult as SensitivityResult,
     SensitivityStatus as SensitivityStatus,
 )

@@ -11,9 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
-from optim.criteria.band import BAND
 from optim.criteria.criterion import Criterion, CriterionRow
-from optim.criteria.peak_criterion import PEAK
+from optim.criteria.peak_criterion import BAND, PEAK
 from solver.continuation.branch import Branch
 from solver.results.notes import MEAN_STRESS_OPEN
 from solver.results.told import json_number

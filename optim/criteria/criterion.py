@@ -1,8 +1,11 @@
-"""What a criterion of a design says of itself: words, units, values with gradients, and limits.
+"""What a criterion of a design says of itself: words, units, values with gradients, and limits; all of them.
 
 The methods, problem files, REST bodies, options of the command, results, reports and the docs follow from
 it. What it judges (`Judged`) and what it gives (`CriterionRow`) stand here too: each speaks of the others. A
 module of a criterion imports what computes inside its functions: a service that only lists loads none of it.
+
+To add a criterion, write a module with `CRITERION`, one or several, and name it in `SHIPPED`; one from
+outside the package is named by `solver.extensions`, or registered for one process.
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ from optim.criteria.key import WORD
 from optim.criteria.key import Form as Form  # with `Criterion` and `Key` all that a criterion is made of
 from optim.criteria.key import Key as Key
 from solver.arrays import FloatOrNaN
+from solver.extensions import Kinds
 from solver.results.told import Piece, json_number
 from solver.wording import documented
 
@@ -28,6 +32,7 @@ if TYPE_CHECKING:
     from solver.continuation.branch import Branch
     from solver.response.wear import WearSensitivity
     from solver.scene.scene import AnyContact, Scene
+
 
 Ranges = tuple[tuple[float, float], ...]
 
@@ -66,8 +71,6 @@ def positive_limit(asked: CriterionContext) -> object:
 
 def registered(name: str) -> Criterion:
     """Return the criterion of a name; KeyError if there is none here."""
-    from optim.criteria.criterion_registry import criteria
-
     return {one.name: one for one in criteria()}[name]
 
 
@@ -149,28 +152,6 @@ class Criterion:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Limits:
-    """What a design must keep."""
-
-    read: Annotated[Mapping[Criterion, Any], "What the keys of each criterion that is limited came to."] = (
-        field(default_factory=dict)
-    )
-
-    def of(self, criterion: Criterion) -> Any:
-        """Return what the keys of a criterion came to; None if none was given."""
-        return self.read.get(criterion)
-
-    def including(self, criterion: Criterion, read: object) -> Limits:
-        """Return the limits with another one of a criterion."""
-        return Limits(read={**self.read, criterion: read})
-
-    @property
-    def any(self) -> bool:
-        """Whether there is a limit at all."""
-        return bool(self.read)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Goals:
     """What a design is to reach, and by what."""
 
@@ -182,7 +163,9 @@ class Goals:
     weights: Annotated[
         Mapping[Criterion, float], "What is minimised: of each the largest value times its weight, summed."
     ]
-    limits: Annotated[Limits, "What must be kept."]
+    limits: Annotated[
+        Mapping[Criterion, Any], "What must be kept: what the keys of each criterion that is limited came to."
+    ]
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -298,7 +281,7 @@ class Judged:
 
     def limit(self, criterion: Criterion) -> Any:
         """Return what the keys of a criterion came to; None if none was given."""
-        return self.problem.limits.of(criterion)
+        return self.problem.limits.get(criterion)
 
     def weight(self, criterion: Criterion) -> float:
         """Return the weight of a criterion in what is minimised."""
@@ -331,14 +314,55 @@ class Judged:
             gradient = by_variables(variables, by_paths)
         twice = None if second is None else partial(_after, partial(by_variables_twice, variables), second)
         weight = self.weight(criterion) if weight is None else weight
-        if criterion.smaller_is_better:
-            return CriterionRow(
-                quantity=criterion, case=self.case.name, what=what, value=value, gradient=gradient,
-                at_hz=at_hz, weight=weight, bound=bound, second=twice,
-            )  # fmt: skip
-        # Kept from above like all rows; 0.0 − 0.0 is 0.0, −0.0 would show its sign.
+        if not criterion.smaller_is_better:
+            # Kept from above like all rows; 0.0 − 0.0 is 0.0, −0.0 would show its sign.
+            what, value, gradient, weight = f"-{what}", 0.0 - value, -gradient, 0.0
+            bound = None if bound is None else 0.0 - bound
+            twice = None if twice is None else partial(_after, operator.neg, twice)
         return CriterionRow(
-            quantity=criterion, case=self.case.name, what=f"-{what}", value=0.0 - value,
-            gradient=-gradient, at_hz=at_hz, weight=0.0, bound=None if bound is None else 0.0 - bound,
-            second=None if twice is None else partial(_after, operator.neg, twice),
+            quantity=criterion, case=self.case.name, what=what, value=value, gradient=gradient, at_hz=at_hz,
+            weight=weight, bound=bound, second=twice,
         )  # fmt: skip
+
+
+SHIPPED = (
+    "optim.criteria.peak_criterion",
+    "optim.criteria.stress",
+    "optim.criteria.frequency_ranges",
+    "optim.criteria.friction_work",
+    "stickslip.lab.wear_life.worn_peak",
+    "optim.criteria.damping",
+    "optim.criteria.mass",
+    "optim.criteria.separation",
+)
+
+
+def _words(criterion: Criterion) -> tuple[str, ...]:
+    flags = [word for key in criterion.keys for word in (key.name, key.flag)]
+    return (criterion.name, *flags, *([f"weights.{criterion.weight}"] if criterion.weight else []))
+
+
+CRITERIA: Kinds[Criterion] = Kinds(Criterion, "criterion", _words, SHIPPED, "CRITERION")
+criteria, register, unregister = CRITERIA.every, CRITERIA.register, CRITERIA.unregister
+
+
+def limit_keys(*, of_fronts: bool | None = None) -> tuple[Key, ...]:
+    """The keys of limits, in order.
+
+    Parameters
+    ----------
+    of_fronts : only those that a front takes, or only those that it does not.
+    """
+    return tuple(
+        key for one in criteria() if of_fronts is None or one.on_a_front is of_fronts for key in one.keys
+    )
+
+
+def weight_words() -> tuple[str, ...]:
+    """The words of `weights`, in order."""
+    return tuple(one.weight for one in criteria() if one.weight)
+
+
+def by_weight(word: str) -> Criterion | None:
+    """The criterion of a word of `weights`."""
+    return next((one for one in criteria() if one.weight == word), None)

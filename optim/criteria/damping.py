@@ -1,7 +1,9 @@
-"""The damping ratio of a nonlinear mode at an amplitude, from below.
+"""The damping ratio of a nonlinear mode at an amplitude, from below, and its quality factor as a goal.
 
 Its derivatives by the parameters are those of the mode at that amplitude (`solver.modes.mode_gradient` and
-`hessian`), whatever the excitation.
+`hessian`), whatever the excitation. The quality factor 1/(2ζ), what the damping leaves, is there as a goal:
+it is above 0 and without end where a mode is not damped, where a damping ratio would be a negative number
+that grows. A mode that gains energy has none.
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ if TYPE_CHECKING:
     from optim.problem.variables import Real
     from solver.scene.scene import Scene
 
-_KEY = "min_damping"
+
+_DAMPING = "min_damping"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +58,7 @@ def damping_of(judged: Judged, amplitude: float, mode: int) -> ModeDamping:
     )  # fmt: skip
 
 
-def _rows(judged: Judged) -> list[CriterionRow]:
+def _damping_rows(judged: Judged) -> list[CriterionRow]:
     """The row of the mode."""
     if (asked := judged.limit(DAMPING)) is None:
         return []
@@ -104,21 +107,67 @@ def _ratio(_scene: Scene) -> float:
     return 0.01
 
 
-DAMPING = CRITERION = Criterion(
+DAMPING = Criterion(
     name="damping ratio",
     unit="1",
     help="The damping ratio of a [nonlinear mode](modes.md) at a modal amplitude.",
-    rows=_rows,
+    rows=_damping_rows,
     smaller_is_better=False,
     keys=(
         Key(
-            name=_KEY, annotation=number_or_table("1", "words"), form=Form.NUMBER_OR_TABLE,
+            name=_DAMPING, annotation=number_or_table("1", "words"), form=Form.NUMBER_OR_TABLE,
             flag="--min-damping", metavar="WORD=X", example="ratio=0.01 and amplitude=0.002",
             examples=({"ratio": 0.01, "amplitude": 0.002, "mode": 1},),
             help="Least damping `ratio` of a `mode` (the first) at a modal `amplitude` [√kg m].",
             option_help="Least damping ratio: ratio=…, amplitude=… [√kg m], perhaps mode=…; repeatable.",
         ),
     ),
-    read=partial(read_mode, key=_KEY, number="ratio", needed=True),
+    read=partial(read_mode, key=_DAMPING, number="ratio", needed=True),
     scale=_ratio,
 )  # fmt: skip
+
+
+_QUALITY = "quality_factor"
+
+
+def _quality_rows(judged: Judged) -> list[CriterionRow]:
+    """The row of the mode."""
+    if (asked := judged.limit(QUALITY)) is None:
+        return []
+    most, amplitude, mode = asked
+    found = damping_of(judged, amplitude, mode)
+    ratio, slope, second = found.value, None, None
+    if found.slope is not None:
+        slope = -0.5 * found.slope / ratio**2
+        second = None if found.second is None else partial(_quality_second, ratio, found.slope, found.second)
+    value = 0.5 / ratio if ratio > 0.0 else math.nan
+    weight = judged.weight(QUALITY) * judged.case.weight
+    what = f"quality factor {found.what}"
+    return [judged.row(QUALITY, what, value, slope, bound=most, weight=weight, second=second)]
+
+
+def _quality_second(ratio: float, slope: Real, second: Callable[[], Real]) -> Real:
+    """Return the second derivatives of 1/(2ζ)."""
+    return slope[:, None] * slope / ratio**3 - 0.5 * second() / ratio**2
+
+
+QUALITY = Criterion(
+    name="quality factor",
+    unit="1",
+    help="1/(2ζ) of a [nonlinear mode](modes.md) at a modal amplitude; minimised times its `weight`.",
+    rows=_quality_rows,
+    weight="quality",
+    needs=_QUALITY,
+    keys=(
+        Key(
+            name=_QUALITY, annotation=number_or_table("1", "words"), form=Form.NUMBER_OR_TABLE,
+            flag="--quality-factor", metavar="WORD=X", example="amplitude=0.002 and most=50",
+            examples=({"amplitude": 0.002, "mode": 1, "most": 50},),
+            help="Of which `mode` (the first) at which modal `amplitude` [√kg m], and the `most` it may be.",
+            option_help="Quality factor: amplitude=… [√kg m], perhaps mode=… and most=…; repeatable.",
+        ),
+    ),
+    read=partial(read_mode, key=_QUALITY, number="most", needed=False),
+)  # fmt: skip
+
+CRITERION = (DAMPING, QUALITY)

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 from optim.criteria.constraint_rows import CaseResponse, DesignEvaluation
-from optim.criteria.criterion import Criterion, CriterionRow, Judged
-from optim.criteria.criterion_registry import criteria
+from optim.criteria.criterion import Criterion, CriterionRow, Judged, criteria
 from optim.problem.cases import LoadCase
 from optim.problem.design_problem import Problem
 from optim.problem.variables import parameter_values
@@ -126,13 +125,13 @@ def ranges_of(problem: Problem, case: LoadCase) -> tuple[Range, ...]:
         one
         for one in every
         if one.ranges is None
-        and (one.always or problem.weights.get(one, 0.0) > 0.0 or limits.of(one) is not None)
+        and (one.always or problem.weights.get(one, 0.0) > 0.0 or limits.get(one) is not None)
     ]
     beyond = [
         Range(low=low, high=high, criteria=(one,))
         for one in every
-        if one.ranges is not None and limits.of(one) is not None
-        for low, high in one.ranges(limits.of(one), case)
+        if one.ranges is not None and limits.get(one) is not None
+        for low, high in one.ranges(limits.get(one), case)
     ]
     return (Range(low=None, high=None, criteria=tuple(of_band)), *beyond)
 

@@ -1,7 +1,9 @@
-"""The friction work of a contact in a cycle, which wears it: its local maxima over the band.
+"""The friction work of a contact in a cycle, which wears it, and its wear rate: local maxima over the band.
 
 The worst over a response is a maximum over the frequency, so its gradient is the one at that frequency
-(envelope theorem), or that of a corner of the response.
+(envelope theorem), or that of a corner of the response. The wear rate is a coefficient times the friction
+power: Archard's law in the form of energy, the worn volume is k times the friction work, k = K / (μ H) of
+Archard's K and the hardness H. Fouvry, Liskiewicz, Kapsa, Hannel, Sauger, Wear 255 (2003) 287-298.
 """
 
 from __future__ import annotations
@@ -19,10 +21,11 @@ if TYPE_CHECKING:
     from solver.response.worst_wear import Measure, WorstWear
     from solver.scene.scene import Scene
 
-_KEY = "max_friction_work"
+
+_WORK = "max_friction_work"
 
 
-def _rows(judged: Judged) -> list[CriterionRow]:
+def _work_rows(judged: Judged) -> list[CriterionRow]:
     """A row for every local maximum that competes, of every contact that is limited."""
     from solver.response.worst_wear import Measure
 
@@ -69,8 +72,8 @@ def _times(factor: float, sensitivity: Sensitivity, worst: WorstWear, contact: s
     return factor * worst_hessian(sensitivity.amplitudes, worst, contact, measure)
 
 
-def _read(asked: CriterionContext) -> Mapping[str, float]:
-    return by_contact(_KEY, asked.values[_KEY], asked.scene)
+def _read_work(asked: CriterionContext) -> Mapping[str, float]:
+    return by_contact(_WORK, asked.values[_WORK], asked.scene)
 
 
 def by_contact(key: str, limits: object, scene: Scene) -> Mapping[str, float]:
@@ -87,19 +90,77 @@ def by_contact(key: str, limits: object, scene: Scene) -> Mapping[str, float]:
     return positive_of_each(key, limits, [contact.name for contact in scene.contacts], rubbing, "contacts")
 
 
-FRICTION_WORK = CRITERION = Criterion(
+FRICTION_WORK = Criterion(
     name="friction work",
     unit="J",
     help="The [friction work](wear.md) of a contact in a cycle, at any frequency of the band.",
-    rows=_rows,
+    rows=_work_rows,
     keys=(
         Key(
-            name=_KEY, annotation=number_or_table("J", "contacts"), form=Form.NUMBER_OR_TABLE,
+            name=_WORK, annotation=number_or_table("J", "contacts"), form=Form.NUMBER_OR_TABLE,
             flag="--max-work", metavar="J|CONTACT=J", example="0.02 or shroud=0.02",
             examples=(0.02, {"shroud": 0.02}),
             help="Largest friction work in a cycle [J], of every friction contact or by contact (wear).",
             option_help="Largest friction work in a cycle [J]; repeatable by contact.",
         ),
     ),
-    read=_read,
+    read=_read_work,
 )  # fmt: skip
+
+
+_RATE, _COEFFICIENT = "max_wear_rate", "wear_coefficient"
+
+
+def _wear_rows(judged: Judged) -> list[CriterionRow]:
+    """A row for every local maximum that competes, of every contact that is limited."""
+    from solver.response.worst_wear import Measure
+
+    weight = judged.weight(WEAR_RATE) * judged.case.weight
+    each = judged.limit(WEAR_RATE) or {}
+    return worst_rows(judged, WEAR_RATE, Measure.FRICTION_POWER, each, weight)
+
+
+def _read_wear(asked: CriterionContext) -> Mapping[str, tuple[float | None, float]]:
+    """The limit, if there is one, and the coefficient of every contact named."""
+    from optim.problem.checks import DesignError
+
+    if _COEFFICIENT not in asked.values:
+        raise DesignError(_COEFFICIENT, None, f"must be given with `{_RATE}` [m³/J]")
+    each = by_contact(_COEFFICIENT, asked.values[_COEFFICIENT], asked.scene)
+    if _RATE not in asked.values:
+        return {name: (None, coefficient) for name, coefficient in each.items()}
+    bounds = by_contact(_RATE, asked.values[_RATE], asked.scene)
+    for name in bounds:
+        if name not in each:
+            raise DesignError(_COEFFICIENT, asked.values[_COEFFICIENT], f"must have one of {name!r} too")
+    return {name: (bound, each[name]) for name, bound in bounds.items()}
+
+
+WEAR_RATE = Criterion(
+    name="wear rate",
+    unit="m³/s",
+    help="The volume that wears off a contact in a second, a coefficient times its friction power, at any "
+    "frequency of the band; minimised times its `weight`.",
+    rows=_wear_rows,
+    weight="wear",
+    needs=_COEFFICIENT,
+    keys=(
+        Key(
+            name=_RATE, annotation=number_or_table("m³/s", "contacts"), form=Form.NUMBER_OR_TABLE,
+            flag="--max-wear-rate", metavar="R|CONTACT=R", example="1e-15 or shroud=1e-15",
+            examples=(1e-15, {"shroud": 1e-15}), beside=_COEFFICIENT,
+            help="Largest wear rate [m³/s], of every friction contact or by contact.",
+            option_help="Largest wear rate [m³/s]; repeatable by contact.",
+        ),
+        Key(
+            name=_COEFFICIENT, annotation=number_or_table("m³/J", "contacts"), form=Form.NUMBER_OR_TABLE,
+            flag="--wear-coefficient", metavar="K|CONTACT=K", example="1e-13 or shroud=1e-13",
+            examples=(1e-13, {"shroud": 1e-13}), beside=_RATE,
+            help="Volume worn off by a unit of friction work [m³/J], of every contact limited or by contact.",
+            option_help="Volume worn off by friction work [m³/J]; repeatable by contact.",
+        ),
+    ),
+    read=_read_wear,
+)  # fmt: skip
+
+CRITERION = (FRICTION_WORK, WEAR_RATE)

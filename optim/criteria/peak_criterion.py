@@ -1,4 +1,7 @@
-"""The highest amplitude of the observed DOF over the band: the local maxima that compete with it."""
+"""The highest amplitude of the observed DOF over the band, and the width of the resonance band.
+
+The band is where the amplitude is above a limit, or above half power of the peak.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,13 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from optim.criteria.criterion import Criterion, CriterionRow, Form, Judged, Key
-from optim.criteria.key import PositiveNumber
+from optim.criteria.key import FrequencyHz, PositiveNumber
 
 if TYPE_CHECKING:
     from optim.criteria.response_gradients import Sensitivity
     from optim.problem.variables import Real
     from solver.continuation.branch import Peak
+
 
 # Peaks below this share of the highest are not handed to the optimiser: within one step they cannot lead.
 COMPETES = 0.6
@@ -31,14 +35,14 @@ def maxima(
         judged.row(
             criterion, f"{what} at {peak.at:.6g} Hz", factor * peak.value,
             None if sensitivity is None else factor * sensitivity.peak(peak),
-            at_hz=peak.at, bound=bound, weight=weight, second=_second(sensitivity, peak, factor),
+            at_hz=peak.at, bound=bound, weight=weight, second=_peak_second(sensitivity, peak, factor),
         )
         for peak in peaks
         if peak.value >= COMPETES * peaks[0].value
     ]  # fmt: skip
 
 
-def _second(sensitivity: Sensitivity | None, peak: Peak, factor: float) -> Callable[[], Real] | None:
+def _peak_second(sensitivity: Sensitivity | None, peak: Peak, factor: float) -> Callable[[], Real] | None:
     if sensitivity is None or not sensitivity.has_second:
         return None
     return partial(_times, factor, sensitivity, peak)
@@ -48,17 +52,17 @@ def _times(factor: float, sensitivity: Sensitivity, peak: Peak) -> Real:
     return factor * sensitivity.peak_second(peak)
 
 
-def _rows(judged: Judged) -> list[CriterionRow]:
+def _peak_rows(judged: Judged) -> list[CriterionRow]:
     """A row for every peak that competes."""
     weight = judged.weight(PEAK) * judged.case.weight
     return maxima(judged, PEAK, "peak", bound=judged.limit(PEAK), weight=weight)
 
 
-PEAK = CRITERION = Criterion(
+PEAK = Criterion(
     name="peak",
     unit="m",
     help="The highest amplitude of the observed DOF over the band of any case; minimised times its `weight`.",
-    rows=_rows,
+    rows=_peak_rows,
     weight="peak",
     keys=(
         Key(
@@ -71,3 +75,58 @@ PEAK = CRITERION = Criterion(
     limit_name="peak limit",
     with_place=False,
 )  # fmt: skip
+
+
+def _band_rows(judged: Judged) -> list[CriterionRow]:
+    """The row of the band of a response that has one."""
+    import numpy as np
+
+    from solver.continuation.extrema.extrema import HALF_POWER
+
+    branch, sensitivity = judged.branch, judged.sensitivity
+    if branch.band is None:
+        return []
+    slope = None
+    if sensitivity is not None:
+        dlimit = np.zeros(len(judged.problem.paths))
+        if judged.problem.limit is None:
+            dlimit = HALF_POWER * sensitivity.peak(branch.peaks[0])
+        slope = sensitivity.band(branch.band.edges, dlimit)
+    what = f"band above {branch.band.limit:.6g} m"
+    return [
+        judged.row(
+            BAND, what, branch.band.width, slope, bound=judged.limit(BAND), second=_band_second(judged)
+        )
+    ]
+
+
+def _band_second(judged: Judged) -> Callable[[], Real] | None:
+    branch, sensitivity = judged.branch, judged.sensitivity
+    if sensitivity is None or branch.band is None or not sensitivity.has_second:
+        return None
+    edges, highest = branch.band.edges, None if judged.problem.limit is not None else branch.peaks[0]
+    return partial(sensitivity.band_second, edges, highest)
+
+
+BAND = Criterion(
+    name="band",
+    unit="Hz",
+    help="The width of the resonance band of any case: the frequencies at which the amplitude is above "
+    "`limit`, or above half power of the peak if that is left out.",
+    rows=_band_rows,
+    weight="band",
+    keys=(
+        Key(
+            name="max_band_hz", annotation=FrequencyHz, form=Form.NUMBER, flag="--max-band", metavar="HZ",
+            help="Largest width of the resonance band allowed [Hz].",
+            option_help="Widest resonance band allowed [Hz].",
+        ),
+    ),
+    always=True,
+    each_blade=True,
+    limit_name="band limit",
+    with_place=False,
+    on_a_front=False,
+)  # fmt: skip
+
+CRITERION = (PEAK, BAND)

@@ -82,7 +82,7 @@ class Identification(Drawn):
     """Parameters identified from measurements."""
 
     VIEWS: ClassVar = Views(
-        "optim.views", "identify:identification", "designs:identification_figure", "identification_dataset"
+        "optim.views", "studies:identification", "figures:identification_figure", "identification_dataset"
     )
     JSON: ClassVar = (
         "scene reached status estimates values covariance correlation noise reduced_chi2 misfit untold"

@@ -110,7 +110,7 @@ class GlobalSearch:
             self._starts_given(begins)
             self._rounds()
             self._last()
-            if not self._feasible() and self.search.problem.limits.any:
+            if not self._feasible() and self.search.problem.limits:
                 self._everywhere()
         finally:
             if not self._samples.whole:
@@ -121,7 +121,7 @@ class GlobalSearch:
         for begin in begins:
             self._descend(begin)
         known = bool(begins) and self._samples.n == 1  # the tracked optima without limits are among them
-        if self.search.problem.limits.any and self._samples.seen and not known:
+        if self.search.problem.limits and self._samples.seen and not known:
             # Limits that do not bind must not make a search worse: begin from what is best without them.
             least = min(self._samples.seen, key=lambda e: e.objective)
             for begin in self._samples.exact([least]):

@@ -12,7 +12,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from optim.criteria.constraint_rows import CaseResponse, DesignEvaluation
-from optim.criteria.criterion import Limits
 from optim.criteria.evaluation import Judge, effects_of, evaluate, ranges_of
 from optim.criteria.peak_criterion import PEAK
 from optim.methods.evaluator import DesignSearch, SearchStoppedError
@@ -128,7 +127,6 @@ def _evaluation(problem: Problem, found: LeastPeak) -> DesignEvaluation | None:
     return DesignEvaluation(values={variable.name: found.at}, responses=(response,), rows=tuple(rows))
 
 
-NO_LIMITS = Limits()
 MOST_CASES = 4
 _OPTIMAL = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND)
 
@@ -162,9 +160,7 @@ def _cases(problem: Problem) -> list[Problem]:
     """Return the plain problems of the single cases that can be tracked."""
     if not problem.peak_alone:
         return []
-    plain = [
-        replace(problem, cases=(case,), limits=NO_LIMITS, start=None, limit=None) for case in problem.cases
-    ]
+    plain = [replace(problem, cases=(case,), limits={}, start=None, limit=None) for case in problem.cases]
     return [one for one in plain if one.why_not_tracked is None]
 
 

@@ -6,8 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from optim.criteria.criterion import Criterion, CriterionContext, Goals, Limits
-from optim.criteria.criterion_registry import by_weight, criteria, limit_keys, weight_words
+from optim.criteria.criterion import (
+    Criterion,
+    CriterionContext,
+    Goals,
+    by_weight,
+    criteria,
+    limit_keys,
+    weight_words,
+)
 from optim.criteria.peak_criterion import PEAK
 from optim.problem.cases import LoadCase, read_cases
 from optim.problem.checks import DesignError, is_number, positive, word
@@ -50,7 +57,7 @@ class Problem(Goals):
     @property
     def plain(self) -> bool:
         """Whether it asks for nothing but the least peak of one case."""
-        return len(self.cases) == 1 and not self.limits.any and self.peak_alone
+        return len(self.cases) == 1 and not self.limits and self.peak_alone
 
     @property
     def peak_alone(self) -> bool:
@@ -122,7 +129,7 @@ def pose(scene: Scene, limits: Sequence[Limit] = (), **given: Any) -> Problem:
     for one in (one for one, weight in weights.items() if weight > 0.0 and one.lacking(scene)):
         raise DesignError(("weights", one.weight), weights[one], one.lacking(scene))
     for one in (one for one, weight in weights.items() if weight > 0.0 and one.needs):
-        if kept.of(one) is None:
+        if one not in kept:
             raise DesignError(("weights", one.weight), weights[one], f"needs `{one.needs}`")
     problem = Problem(
         scene=scene, variables=chosen, cases=cases, limit=limit, weights=weights,
@@ -211,14 +218,14 @@ def _weights(weights: Mapping[str, float] | None) -> dict[Criterion, float]:
 
 def _limits(
     scene: Scene, cases: tuple[LoadCase, ...], limit: float | None, given: Mapping[str, object]
-) -> Limits:  # fmt: skip
+) -> dict[Criterion, Any]:  # fmt: skip
     """Return what the keys of the criteria come to."""
     read: dict[Criterion, Any] = {}
     for one in criteria():
         values = {key.name: given[key.name] for key in one.keys if given.get(key.name) is not None}
         if values:
             read[one] = one.read(CriterionContext(scene=scene, cases=cases, limit=limit, values=values))
-    return Limits(read=read)
+    return read
 
 
 def read_start(

@@ -9,8 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any
 
-from optim.criteria.criterion import CriterionContext
-from optim.criteria.criterion_registry import criteria
+from optim.criteria.criterion import CriterionContext, criteria
 from optim.problem.cases import read_case, read_cases
 from optim.problem.checks import positive
 from optim.problem.design_problem import READERS, pose, read_start

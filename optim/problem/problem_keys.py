@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Optional, TypeVar, ge
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, create_model
 
-from optim.criteria.criterion_registry import criteria, limit_keys, weight_words
+from optim.criteria.criterion import criteria, limit_keys, weight_words
 from optim.criteria.key import (
     LARGEST,
     LEAST,

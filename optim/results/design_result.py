@@ -8,9 +8,8 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from optim.criteria.band import BAND
 from optim.criteria.criterion import CriterionRow
-from optim.criteria.peak_criterion import PEAK
+from optim.criteria.peak_criterion import BAND, PEAK
 from optim.problem.checks import Method
 from optim.results.doubts import doubts_of
 from solver.arrays import FloatOrNaN

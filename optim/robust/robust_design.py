@@ -17,9 +17,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Unpack
 
-from optim.criteria.band import BAND
 from optim.criteria.criterion import CriterionRow
-from optim.criteria.peak_criterion import PEAK
+from optim.criteria.peak_criterion import BAND, PEAK
 from optim.methods.enough_harmonics import most_harmonics
 from optim.methods.evaluator import SearchStoppedError
 from optim.methods.linearised import KEPT

@@ -179,7 +179,7 @@ class Cut(Piece):
 class RobustResult(MadeOfResponses, Drawn):
     """The nominal and the robust optimum side by side."""
 
-    VIEWS: ClassVar = Views("optim.views", "robust:robust", "designs:robust_figure", "robust_dataset")
+    VIEWS: ClassVar = Views("optim.views", "design:robust", "figures:robust_figure", "robust_dataset")
     JSON: ClassVar = (
         "scene=problem.scene.name measured=design.measured aim quantile uncertain optimum nominal robust"
         " objective gain cuts gap inner_look optimality=conditions.residual"

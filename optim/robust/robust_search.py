@@ -210,5 +210,5 @@ class RobustSearch:
         ]
         return (
             *minimised,
-            *(Aspect(quantity=q, limited=True, unit=self.scales[q]) for q in self.problem.limits.read),
+            *(Aspect(quantity=q, limited=True, unit=self.scales[q]) for q in self.problem.limits),
         )

@@ -14,7 +14,7 @@ import numpy as np
 
 from optim.problem.cases import with_engine_order
 from optim.problem.checks import DesignError, number_pair
-from optim.studies.crossings import CampbellDiagram, CampbellStatus, Crossing, OrderResponse, Ranges
+from optim.results.studies_result import CampbellDiagram, CampbellStatus, Crossing, OrderResponse, Ranges
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Branch, BranchStatus, Peak

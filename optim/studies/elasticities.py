@@ -17,7 +17,7 @@ import numpy as np
 from optim.criteria.peak_criterion import COMPETES
 from optim.criteria.response_gradients import Sensitivity
 from optim.problem.variables import Real
-from optim.studies.sensitivity_result import (
+from optim.results.studies_result import (
     ParameterSensitivity,
     SensitivityResult,
     SensitivityStatus,

@@ -17,9 +17,8 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 from scipy.optimize import linprog
 
-from optim.criteria.band import BAND
 from optim.criteria.constraint_rows import DesignEvaluation
-from optim.criteria.peak_criterion import PEAK
+from optim.criteria.peak_criterion import BAND, PEAK
 from optim.methods.enough_harmonics import only_if_known
 from optim.methods.evaluator import DesignSearch, SearchStoppedError
 from optim.methods.linearised import ACTIVE, Local, Model, bounds_held
@@ -28,8 +27,8 @@ from optim.problem.design_problem import Limit, Method, Problem, pose
 from optim.problem.problem_keys import FEWEST_POINTS, POINTS, FrontKeys, keywords
 from optim.problem.variables import BoundedVariable, scaled, unscaled
 from optim.results.design_result import DesignResult, DesignStatus
+from optim.results.studies_result import ParetoPoint, ParetoResult, ParetoStatus, front_of
 from optim.search import judge, local_search_of, solve_problem
-from optim.studies.pareto_result import ParetoPoint, ParetoResult, ParetoStatus, front_of
 from solver.jit.timer import clock
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
@@ -197,7 +196,7 @@ class _Front:
 
     def _add(self, one: ParetoPoint, other: ParetoPoint, width: float) -> None:
         """Search the least peak with the band at most so wide."""
-        limited = replace(self.problem, limits=self.problem.limits.including(BAND, width))
+        limited = replace(self.problem, limits={**self.problem.limits, BAND: width})
         search = DesignSearch(limited, self._report, self._should_stop, MOST_EVALUATIONS)
         rebound = [_at_limit(evaluation, width) for evaluation in self._pool]
         search.keep(_at_limit(self.ends[0].evaluation or rebound[0], width))

@@ -18,10 +18,8 @@ if TYPE_CHECKING:
     from optim.identification.identification_result import Identification
     from optim.problem.variables import BoundedVariable as DesignVariable
     from optim.results.design_result import DesignResult
+    from optim.results.studies_result import CampbellDiagram, ParetoResult, SensitivityResult
     from optim.robust.robust_result import RobustResult
-    from optim.studies.crossings import CampbellDiagram
-    from optim.studies.pareto_result import ParetoResult
-    from optim.studies.sensitivity_result import SensitivityResult
 
 
 def design_dataset(result: DesignResult) -> Dataset:

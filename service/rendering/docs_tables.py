@@ -15,7 +15,7 @@ from typing import Any, get_args
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from optim.criteria.criterion_registry import criteria, limit_keys
+from optim.criteria.criterion import criteria, limit_keys
 from optim.criteria.key import Key, Option
 from optim.identification.data.measured import data_kinds
 from optim.identification.data.measured_units import known_units

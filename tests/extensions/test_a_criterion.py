@@ -15,7 +15,7 @@ from rms_amplitude import RMS, WEIGHTS, frequencies
 
 import optim
 import solver
-from optim.criteria.criterion_registry import CRITERIA, criteria, register, unregister
+from optim.criteria.criterion import CRITERIA, criteria, register, unregister
 from optim.criteria.evaluation import evaluate
 from optim.problem.design_problem import pose
 from service.client.client import Client

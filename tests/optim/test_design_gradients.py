@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 import solver
-from optim.criteria.band import BAND
 from optim.criteria.constraint_rows import DesignEvaluation, nearest
 from optim.criteria.criterion import CriterionRow
 from optim.criteria.evaluation import evaluate
-from optim.criteria.forbidden import FORBIDDEN
+from optim.criteria.frequency_ranges import FORBIDDEN
 from optim.criteria.friction_work import FRICTION_WORK
-from optim.criteria.peak_criterion import PEAK
+from optim.criteria.peak_criterion import BAND, PEAK
 from optim.criteria.separation import SEPARATION
 from optim.problem.design_problem import Problem, pose
 

@@ -5,11 +5,10 @@ import pytest
 
 import optim
 import solver
-from optim.criteria.band import BAND
-from optim.criteria.criterion_registry import criteria
+from optim.criteria.criterion import criteria
 from optim.criteria.evaluation import evaluate
-from optim.criteria.forbidden import FORBIDDEN
-from optim.criteria.peak_criterion import PEAK
+from optim.criteria.frequency_ranges import FORBIDDEN
+from optim.criteria.peak_criterion import BAND, PEAK
 from optim.problem.checks import DesignError
 from optim.problem.design_problem import pose
 from optim.results.design_result import DesignStatus

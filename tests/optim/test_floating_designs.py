@@ -14,8 +14,8 @@ from return_map import Return
 
 import optim
 from optim.results.design_result import DesignStatus
+from optim.results.studies_result import CampbellStatus
 from optim.robust.robust_result import RobustStatus
-from optim.studies.crossings import CampbellStatus
 from service.cli import main
 from solver import (
     BranchStatus,

@@ -17,7 +17,7 @@ import optim
 import solver
 import stickslip.lab
 from optim.results.design_result import DesignStatus
-from optim.views.tables.robust import robust
+from optim.views.tables.design import robust
 from service.cli import main
 from service.rendering.text import print_told
 from solver.results.base import MadeOfResponses, Shown

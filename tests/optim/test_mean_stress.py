@@ -9,7 +9,7 @@ from stress_scenes import STEEL
 import optim
 import solver
 from optim.criteria.evaluation import evaluate
-from optim.criteria.utilisation import UTILISATION
+from optim.criteria.stress import UTILISATION
 from optim.problem.design_problem import pose
 from optim.results.design_result import DesignStatus
 from solver.scene.scene import Scene

@@ -8,13 +8,11 @@ import pytest
 import optim
 import solver
 from optim.criteria.criterion import Criterion
-from optim.criteria.damping import DAMPING
+from optim.criteria.damping import DAMPING, QUALITY
 from optim.criteria.evaluation import evaluate
-from optim.criteria.friction_work import FRICTION_WORK
+from optim.criteria.frequency_ranges import RUNNING
+from optim.criteria.friction_work import FRICTION_WORK, WEAR_RATE
 from optim.criteria.mass import MASS
-from optim.criteria.quality import QUALITY
-from optim.criteria.running_speeds import RUNNING
-from optim.criteria.wear_rate import WEAR_RATE
 from optim.problem.checks import DesignError
 from optim.problem.design_problem import pose
 from optim.problem.issues import problem_issues

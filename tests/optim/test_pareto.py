@@ -12,8 +12,8 @@ import pytest
 
 import optim
 import solver
-from optim.studies.pareto_result import ParetoStatus, front_of
-from optim.views.plots.designs import pareto_figure
+from optim.results.studies_result import ParetoStatus, front_of
+from optim.views.plots.figures import pareto_figure
 
 LIMIT = 0.08e-3
 DISK = solver.load_scene("bladed-disk")

@@ -12,9 +12,8 @@ from mistuned_cases import disk as friction_disk
 
 import optim
 import solver
-from optim.criteria.band import BAND
 from optim.criteria.criterion import CriterionRow
-from optim.criteria.peak_criterion import PEAK
+from optim.criteria.peak_criterion import BAND, PEAK
 from optim.problem.design_problem import pose
 from optim.problem.uncertainty_input import read_uncertain
 from optim.problem.uncertainty_set import Scenario, UncertaintyShape
@@ -305,7 +304,7 @@ def test_a_limit_is_kept_in_every_scenario() -> None:
         solver.sweep(TWO.with_values({**result.optimum, "damper.mu": mu}), limit=1.5).band.width  # type: ignore[union-attr]
         for mu in np.linspace(0.25, 0.35, 11)
     ]
-    assert problem.limits.of(BAND) == 0.30
+    assert problem.limits.get(BAND) == 0.30
     assert (max(bands) <= 0.30 * (1.0 + 1e-5)) == (result.status is RobustStatus.OPTIMAL)
 
 

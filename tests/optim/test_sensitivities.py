@@ -9,8 +9,8 @@ import pytest
 
 import optim
 import solver
-from optim.studies.sensitivity_result import ParameterSensitivity, SensitivityStatus
-from optim.views.plots.designs import sensitivities_figure
+from optim.results.studies_result import ParameterSensitivity, SensitivityStatus
+from optim.views.plots.figures import sensitivities_figure
 
 DESIGNS = {"two-dof": {"damper.N0": 140.0}, "bladed-disk": {"shroud.N0": 150.0}}
 BAND_LIMIT = {"two-dof": 1.8, "bladed-disk": 0.08e-3}

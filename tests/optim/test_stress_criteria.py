@@ -11,8 +11,7 @@ from cases.stress_scenes import STEEL, TERMS, stressed
 import optim
 import solver
 from optim.criteria.evaluation import evaluate
-from optim.criteria.stress import STRESS
-from optim.criteria.utilisation import UTILISATION
+from optim.criteria.stress import STRESS, UTILISATION
 from optim.problem.checks import DesignError
 from optim.problem.design_problem import pose
 from optim.results.design_result import DesignStatus

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field
 
 import solver
-from optim.studies.sensitivity_result import ParameterSensitivity, SensitivityResult
+from optim.results.studies_result import ParameterSensitivity, SensitivityResult
 from service.jobs.common.periods import Period, period_of
 from service.jobs.common.result_models import KindResult, PeakAt, result_model
 from service.jobs.common.scene_requests import (

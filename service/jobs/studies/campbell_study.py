@@ -20,7 +20,7 @@ from solver.errors import Issue
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from optim.studies.crossings import CampbellDiagram
+    from optim.results.studies_result import CampbellDiagram
     from solver.scene.scene import Scene
     from solver.views.plots.curves import Response
 
@@ -36,7 +36,7 @@ class Campbell(Study, HarmonicRequest):
 
     EXAMPLES = ({"scene": "bladed-disk", "speeds_rpm": [[40000, 50000]], "orders": [1, 2, 3], "limit": 8e-5},)
     NAME, FUNCTION = "campbell", "optim:campbell_diagram"
-    RESULT = answered("optim.studies.crossings:CampbellDiagram", "CampbellResult")
+    RESULT = answered("optim.results.studies_result:CampbellDiagram", "CampbellResult")
     TOLD = "optim.views.tables.studies:campbell"
     SHOWS = "crossings and speeds above the limit ([Campbell diagrams](campbell.md))"
     EMPTY = ("orders", "it stored no sweep to draw")
@@ -85,7 +85,7 @@ class Campbell(Study, HarmonicRequest):
     @classmethod
     def figure(cls, result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:
         """Return each order with the stored response whose highest peak is its own."""
-        from optim.views.plots.campbell import campbell_figure
+        from optim.views.plots.figures import campbell_figure
         from service.jobs.drawing import response_of
         from solver.results.measures import Measured
 

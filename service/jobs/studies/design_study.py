@@ -182,7 +182,7 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
     def figure(cls, result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:
         """Return the response of the optimum; of a robust design both optima over the uncertainty."""
         if "nominal" in result:
-            from optim.views.plots.designs import robust_figure
+            from optim.views.plots.figures import robust_figure
 
             return robust_figure(result)
         from service.jobs.drawing import best_sweep_figure

@@ -140,10 +140,10 @@ class Identify(Measured):
         },
     )
     NAME, FUNCTION, RESULT = "identify", "optim:identify", identify_result
-    TOLD = "optim.views.tables.identify:identification"
+    TOLD = "optim.views.tables.studies:identification"
     SHOWS = "estimates, intervals, what the data do not tell ([identification](identification.md))"
     EMPTY, COUNTED = ("runs", "there is no fit to draw"), "places"
-    FIGURE = "optim.views.plots.designs:identification_figure"
+    FIGURE = "optim.views.plots.figures:identification_figure"
 
     robust: bool = Field(default=False, description="Let outliers weigh less (Huber).")
     candidates: Annotated[dict[ParameterPath, _Values] | None, Flag("--candidate", "PATH=V,V,…")] = Field(

@@ -32,7 +32,7 @@ class _Pareto(PointsOfFront, ProblemRequest):
     KEYS = "those of a design problem, `points`"
     TOLD = "optim.views.tables.design:front"
     SHOWS, SWEEPS = "the front of peak against band ([trade-offs](trade-offs.md))", "those of its points"
-    EMPTY, FIGURE = ("points", "its front has no point"), "optim.views.plots.designs:pareto_figure"
+    EMPTY, FIGURE = ("points", "its front has no point"), "optim.views.plots.figures:pareto_figure"
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""

@@ -16,7 +16,7 @@ from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue
 
 if TYPE_CHECKING:
-    from optim.studies.sensitivity_result import SensitivityResult
+    from optim.results.studies_result import SensitivityResult
     from solver.scene.scene import Scene
 
 
@@ -29,11 +29,11 @@ class Sensitivities(Study, HarmonicRequest):
     EXAMPLES = ({"scene": "two-dof", "harmonics": 5},)
     NAME, FUNCTION = "sensitivities", "optim:sensitivities"
     RESULT = answered(
-        "optim.studies.sensitivity_result:SensitivityResult", "SensitivitiesResult", peaks=list[PeakAt]
+        "optim.results.studies_result:SensitivityResult", "SensitivitiesResult", peaks=list[PeakAt]
     )
     TOLD = "optim.views.tables.studies:shares"
     SHOWS = "the change of peaks and band by one per cent of each parameter ([sensitivities](trade-offs.md))"
-    SWEEPS, FIGURE = "the response", "optim.views.plots.designs:sensitivities_figure"
+    SWEEPS, FIGURE = "the response", "optim.views.plots.figures:sensitivities_figure"
 
     limit: Annotated[PositiveNumber | None, Flag(metavar="A")] = Field(
         default=None,

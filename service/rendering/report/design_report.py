@@ -117,7 +117,7 @@ def _trade_off(result: Json) -> list[str]:
     """The front, of a job that computed one."""
     if not _is_front(result) or not result["points"]:
         return []
-    from optim.views.plots.designs import pareto_figure
+    from optim.views.plots.figures import pareto_figure
 
     words = "The front of peak against band, and the frequencies at risk"
     return ["<h2>Trade-off</h2>", image(pareto_figure(result), words), block_html(next(front(result)))]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
-from optim.views.tables.identify import candidate_words, estimate_row, told_pairs
+from optim.views.tables.studies import candidate_words, estimate_row, told_pairs
 from service.rendering.report.sections import (
     Designed,
     Json,
@@ -62,7 +62,7 @@ def _estimates(scene: Scene, found: Json) -> str:
 
 def _fit(found: Json) -> list[str]:
     """The data with the fit and its band, and the runs they are of."""
-    from optim.views.plots.designs import identification_figure
+    from optim.views.plots.figures import identification_figure
 
     if not found["runs"]:
         return []

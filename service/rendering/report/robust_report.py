@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from optim.views.plots.designs import robust_figure
-from optim.views.tables.robust import SIDE_LINES, effort_pairs, uncertain_rows
+from optim.views.plots.figures import robust_figure
+from optim.views.tables.design import SIDE_LINES, effort_pairs, uncertain_rows
 from service.rendering.report.responses_report import DASHED, ReportLine, Sweeps, in_scenario, linear_lines
 from service.rendering.report.sections import (
     Designed,

@@ -13,7 +13,7 @@ from optim.identification.reading import read_data
 from optim.identification.unknowns import read_unknowns
 from optim.problem.checks import DesignError
 from optim.problem.uncertainty_input import read_uncertain
-from optim.views.tables.identify import identification
+from optim.views.tables.studies import identification
 from service.rendering.text import print_told
 
 SCENE = solver.load_scene("two-dof")
