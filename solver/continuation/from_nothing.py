@@ -84,19 +84,20 @@ def _followed(balance: Balance) -> tuple[Real | None, int]:
     """
     # Loaded here: hardly any point needs the kernels of the arc, and a command starts sooner without them.
     from solver.continuation.kernels.pseudo_arclength import begin_walk
-    from solver.continuation.stretches import STRETCH, BranchStretches, control_of
+    from solver.continuation.stretches import BranchStretches, control_of
     from solver.continuation.walk import ContinuationSettings, walk
 
     workspace = Workspace.of(balance)
     level = balance.parameter.inside(balance.scene.value(AMPLITUDE))
-    control = control_of(ContinuationSettings(), LOWEST * level, level)
+    settings = ContinuationSettings()
+    control = control_of(settings, LOWEST * level, level, settings.pace)
     least = workspace.solve(control.start)
     if not least.converged:
         return None, least.iterations
     code, state = begin_walk(workspace.system, workspace.linear, workspace.point, control, least.u)
     arc = BranchStretches(workspace, control, code, state, least.iterations, clock())
     points, last = 0, None
-    for last in walk(arc, STRETCH, 1.0):
+    for last in walk(arc, arc.pace):
         points += len(last.solutions)
         if points >= MOST_POINTS:
             break

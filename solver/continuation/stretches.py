@@ -35,7 +35,7 @@ from solver.continuation.kernels.walk_state import (
     walk_by_value,
     weights,
 )
-from solver.continuation.walk import ContinuationSettings, Curve
+from solver.continuation.walk import ContinuationSettings, Curve, Pace
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
 from solver.jit.timer import clock
@@ -49,7 +49,7 @@ MANY, NEAR, STILL = 24, 1e-7, 1e-3  # points within such shares of the range and
 _MOVES = 1e-6  # share of the largest amplitude of a contact, of harmonics with which one moves
 AHEAD = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # of the range, where it is looked why a branch went no further
 
-STRETCH = 64  # points between two looks at the caller, at most
+_STRETCH = Pace(first=64, least=1, largest=64)  # points between two looks at the caller
 _SHORT_STRETCH = 4  # the first of them where a point may take long
 _LARGE = 400  # unknowns from which it may
 _STRETCH_SECONDS = 0.5
@@ -273,12 +273,11 @@ def ratchets_ahead(workspace: Workspace, state: walk_states.Walk, control: Contr
     return False
 
 
-def control_of(settings: ContinuationSettings, start: float, stop: float) -> Control:
+def control_of(settings: ContinuationSettings, start: float, stop: float, pace: Pace) -> Control:
     """Return the settings of the compiled steps from one λ to another (inside unit)."""
     return Control(
-        start=start, stop=stop, first_step=settings.first_step, largest_step=settings.largest_step,
-        smallest_step=settings.smallest_step, wanted_iterations=settings.wanted_iterations,
-        most_iterations=settings.most_iterations, predictor=int(settings.predictor),
+        start=start, stop=stop, first_step=pace.first, largest_step=pace.largest, smallest_step=pace.least,
+        wanted_iterations=int(pace.easy), most_iterations=int(pace.hard), predictor=int(settings.predictor),
         largest_turn=settings.largest_turn, range_weight=settings.range_length,
     )  # fmt: skip
 
@@ -307,9 +306,10 @@ class BranchStretches(Curve[Stretch]):
         return self._status is not None or self._code != walk_states.RUNNING
 
     @property
-    def size(self) -> int:
-        """Points of the first stretch."""
-        return STRETCH if self._workspace.balance.n_unknowns <= _LARGE else _SHORT_STRETCH
+    def pace(self) -> Pace:
+        """How many points its stretches have."""
+        large = self._workspace.balance.n_unknowns > _LARGE
+        return replace(_STRETCH, first=_SHORT_STRETCH) if large else _STRETCH
 
     def tried(self, size: float) -> tuple[Stretch | None, float]:
         """Return the next stretch, of no more than `size` points, and how many the one behind it may have."""
@@ -333,7 +333,7 @@ class BranchStretches(Curve[Stretch]):
         stretch = balanced_part(workspace, self._stretch(rows, count, status))
         self._code, self._status, self._state = code, stretch.status, state if again is None else again
         longer = min(2.0, _STRETCH_SECONDS / max(clock() - before, 1e-9))
-        return stretch, min(STRETCH, max(1, int(size * longer)))
+        return stretch, min(_STRETCH.largest, max(_STRETCH.least, int(size * longer)))
 
     def _stretch(self, rows: dict[str, Any], count: int, status: BranchStatus | None) -> Stretch:
         numbers = walk_by_value(self._state).numbers

@@ -11,14 +11,46 @@ points they have.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Protocol, TypeVar
+from typing import Annotated, Protocol, TypeVar
 
 from solver.continuation.kernels import walk_state as walk_states
 
 _Point = TypeVar("_Point", covariant=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pace:
+    """How long steps are: they grow behind an easy point, and shrink behind a hard one or where a try failed.
+
+    What effort a point takes each curve says: Newton steps, or a distance from what was foreseen.
+    """
+
+    first: Annotated[float, "Step to begin with."]
+    least: Annotated[float, "Below it a try that failed is not made again."]
+    largest: Annotated[float, "No step is longer."] = math.inf
+    grow: Annotated[float, "Factor behind an easy point."] = 2.0
+    shrink: Annotated[float, "Factor where a try failed."] = 0.5
+    easy: Annotated[float, "Effort up to which a point is easy."] = 0.0
+    hard: Annotated[float, "Effort from which it is hard, and the next step is half as long."] = math.inf
+
+    def after(self, size: float, effort: float = 0.0) -> float:
+        """Return the step behind a point that took such an effort."""
+        if effort >= self.hard:
+            return max(0.5 * size, self.least)
+        return min(size * (self.grow if effort <= self.easy else 1.0), self.largest)
+
+    def shorter(self, size: float, least: float = 0.0) -> float:
+        """Return the step to try next where one failed that should not become shorter than a least one."""
+        return max(self.shrink * size, least)
+
+    def times(self, length: float) -> Pace:
+        """Return the same of steps that are shares of a length."""
+        ends = self.first * length, self.least * length, self.largest * length
+        return replace(self, first=ends[0], least=ends[1], largest=ends[2])
 
 
 class Curve(Protocol[_Point]):
@@ -36,17 +68,12 @@ class Curve(Protocol[_Point]):
         return None, 0.0
 
 
-def walk(curve: Curve[_Point], size: float, least: float) -> Iterator[_Point]:
-    """Yield the points of a curve behind the one where it stands; whoever takes them may leave.
-
-    Parameters
-    ----------
-    size : of the first step.
-    least : a step that was not taken is tried again as long as it is not shorter.
-    """
+def walk(curve: Curve[_Point], pace: Pace) -> Iterator[_Point]:
+    """Yield the points of a curve behind the one where it stands; whoever takes them may leave."""
+    size = pace.first
     while not curve.ended:
         point, size = curve.tried(size)
-        if point is None and size < least:
+        if point is None and size < pace.least:
             point, size = curve.leapt()
             if point is None:
                 return
@@ -104,3 +131,11 @@ class ContinuationSettings:
     peaks: bool = True
     unfinished_peaks: bool = True
     errors: bool = True
+
+    @property
+    def pace(self) -> Pace:
+        """Its steps; a point that takes more Newton iterations than are wanted is not easy."""
+        return Pace(
+            first=self.first_step, least=self.smallest_step, largest=self.largest_step,
+            easy=self.wanted_iterations, hard=self.most_iterations,
+        )  # fmt: skip

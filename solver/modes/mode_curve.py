@@ -18,14 +18,13 @@ from itertools import chain
 
 import numpy as np
 
-from solver.continuation.walk import walk
+from solver.continuation.walk import Pace, walk
 from solver.jit.fourier import Real
 from solver.modes.corrector import Corrected, ModeState, carried_anew, correct, scales
 from solver.modes.mode_equations import Equations
 
-FIRST_STEP, LARGEST_STEP, LEAST_STEP = 0.1, 0.4, 1e-4
+_PACE = Pace(first=0.1, least=1e-4, largest=0.4, grow=1.6, shrink=0.4, easy=5, hard=9)  # by Newton steps
 _SHARPNESS = 4.0  # weight of changes of ln ω and ζ beside those of ln a
-_EASY, _HARD = 5, 9  # Newton steps
 _JUMPS = (0.02, 0.06, 0.15, 0.3, 0.6, 1.0)  # of ln a, over what no short step passes
 LEAST_SHARE = 0.9  # of a² that harmonic 1 has
 _RESOLVED = 0.05  # step over which a curve may bend as it will: a kink is no farther from a point
@@ -81,7 +80,7 @@ def follow(
         first.state.log_amplitude,
         None,
     )
-    for point in chain([first], walk(curve, FIRST_STEP, LEAST_STEP)):
+    for point in chain([first], walk(curve, _PACE)):
         at = point.state.log_amplitude
         if at < least:
             end = CurveEnd.TURNED_BACK
@@ -155,13 +154,10 @@ class _ModeCurve:
         followed = found.converged and equations.follows(here.state.y, found.state.y)
         if not followed or not is_near(here, found, size, equations.size):
             self.rejected += 1
-            return None, 0.4 * size
+            return None, _PACE.shorter(size)
         if size > _RESOLVED and _bends(guess, found.state):
-            return None, max(0.4 * size, _RESOLVED)
-        if found.iterations <= _EASY:
-            size = min(1.6 * size, LARGEST_STEP)
-        elif found.iterations >= _HARD:
-            size = max(0.5 * size, LEAST_STEP)
+            return None, _PACE.shorter(size, _RESOLVED)
+        size = _PACE.after(size, found.iterations)
         found = carried_anew(equations, found)
         if share_of_first(equations, found) < self._least_share:
             return None, 0.0

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver.balance.balance import Balance
+from solver.continuation.walk import Pace
 from solver.jit.fourier import Complex, Real, cosine_position
 from solver.linear.assembly import linear_model
 from solver.matrices.normal_modes import hermitian, undamped_modes
@@ -19,6 +20,7 @@ _MOST = 60  # Newton steps to the equilibrium
 _LEAST = 1e-10  # relative motion of a contact below which a mode does not move it
 _RUNGS = 6  # decades below the first amplitude from which the mode is walked up, if it must
 _DECADE = math.log(10.0)
+_PACE = Pace(first=_DECADE / 3.0, least=_DECADE / 100.0)  # of ln a on the way up
 _MOST_AT_FIRST = 40
 _MAJORITY = 0.5  # share of a² in the mode asked for, of which only one mode can have more
 _SAME = 1e-4  # of ω and in ζ, within which a motion of another shape is of a mode just as fast
@@ -243,14 +245,14 @@ def _is_of(equations: Equations, mode: LinearMode, found: Corrected) -> bool:
 
 def _raised(equations: Equations, found: Corrected, rest: Real, low: float) -> Corrected:
     """Return the next point on the way up to ln a = `low`, a third of a decade on, or less if it must."""
-    rise = min(_DECADE / 3.0, low - found.state.log_amplitude)
+    rise = min(_PACE.first, low - found.state.log_amplitude)
     # The last rise may be as short as it will.
-    size, better, least = equations.size, found, min(_DECADE / 100.0, 0.5 * rise)
+    size, better, least = equations.size, found, min(_PACE.least, 0.5 * rise)
     while rise > least:
         raised = found.state.scaled(size, math.exp(rise), rest.reshape(-1))
         guess = replace(raised, log_amplitude=found.state.log_amplitude + rise)
         better = correct(equations, guess, most=_MOST_AT_FIRST)
         if better.converged:
             return carried_anew(equations, better)
-        rise *= 0.5
+        rise = _PACE.shorter(rise)
     return better

@@ -23,18 +23,18 @@ from solver.contacts.kernels.system import DENSE, MODES
 from solver.continuation.branch import BranchStatus
 from solver.continuation.extrema.nodes import NodeSolver, PointRow
 from solver.continuation.stretches import Stretch, ending
-from solver.continuation.walk import walk
+from solver.continuation.walk import Pace, walk
 from solver.jit.fourier import Real
 from solver.jit.timer import clock
 from solver.linear.assembly import linear_model
 
-LARGEST, FIRST, SMALLEST = 0.0143, 1e-3, 1e-9  # steps, as shares of the range
 TURN = 1e-6  # share of the range by which a branch has to turn back to be lost: less is a step over a kink
-_OFF = 0.1  # distance from prediction to solution, relative to the motion, above which a step is halved
+# Steps, as shares of the range; the effort is how far the solution lies from the prediction, over `_OFF`.
+_PACE = Pace(first=1e-3, least=1e-9, largest=0.0143, grow=1.6, easy=0.3)
+_OFF = 0.1  # that distance relative to the motion, above which a step is halved
 # The same over the smallest step, above which nothing connects the two: a motion that grows without bound
 # towards a resonance that nothing damps comes back with its phase turned round.
 _TORN = 1.0
-_GROWTH = 1.6
 _STRETCH = 64
 
 
@@ -77,7 +77,7 @@ def walk_by_points(
     """
     curve = _Unique(workspace, before, stop, span)
     nodes: list[PointRow] = []
-    for node in walk(curve, FIRST * span, SMALLEST * span):
+    for node in walk(curve, curve.pace):
         nodes.append(node)
         if len(nodes) == _STRETCH:
             yield _stretch(before, nodes, None, curve, begun)
@@ -90,11 +90,12 @@ class _Unique:
 
     Attributes
     ----------
+    pace : its steps.
     status : how it ended; None as long as it goes on.
     """
 
     def __init__(self, workspace: Workspace, before: Stretch, stop: float, span: float) -> None:
-        self._workspace, self._stop, self._span = workspace, stop, span
+        self._workspace, self._stop, self.pace = workspace, stop, _PACE.times(span)
         self.solver, self.rejected = NodeSolver(workspace), 0
         last = before.solutions[-1]
         self._onward = float(np.sign(stop - last[-1])) or 1.0
@@ -113,7 +114,7 @@ class _Unique:
 
     def tried(self, size: float) -> tuple[PointRow | None, float]:
         """Solve at a value of the parameter, from where the tangent leads or from the last point."""
-        last, onward, least = self._last, self._onward, SMALLEST * self._span
+        last, onward, least = self._last, self._onward, self.pace.least
         if last is None:
             return None, 0.0
         ahead = (self._stop - last.at) * onward
@@ -124,14 +125,14 @@ class _Unique:
         far = np.inf if node is None else _moved(self._workspace.balance, node.solution[:-1] - guess)
         if node is None or (far > _OFF * scale and size > least):
             self.rejected += 1
-            return None, 0.5 * size if node is None else max(0.5 * size, least)
+            return None, self.pace.shorter(size, 0.0 if node is None else least)
         if far > _TORN * scale:
             self.status = BranchStatus.STALLED
             return None, 0.0
         self._last = node
         if there == self._stop:
             self.status = BranchStatus.COMPLETED
-        return node, min(LARGEST * self._span, size * (_GROWTH if far < 0.3 * _OFF * scale else 1.0))
+        return node, self.pace.after(size, far / (_OFF * scale))
 
     def leapt(self) -> tuple[None, float]:
         """Say why nothing was found where it was tried last."""

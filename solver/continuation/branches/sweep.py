@@ -234,11 +234,11 @@ def walk(
     """
     begun = clock() - (0.0 if resume is None else resume.seconds)
     balance, inside = workspace.balance, workspace.balance.parameter.inside
-    control = control_of(settings, inside(start), inside(stop))
+    pace = settings.pace
     if balance.n_unknowns >= _DEAR:
-        control = control._replace(largest_step=_LONGER * control.largest_step)
-        if is_spanned(workspace.system):
-            control = control._replace(first_step=_LONGER * control.first_step)
+        first = (_LONGER if is_spanned(workspace.system) else 1.0) * pace.first
+        pace = replace(pace, first=first, largest=_LONGER * pace.largest)
+    control = control_of(settings, inside(start), inside(stop), pace)
     if resume is None:
         found = solve_from_nothing(workspace, control.start, guess)
         spent = found.iterations
@@ -253,7 +253,7 @@ def walk(
         code = walk_states.RUNNING if resume.status is None else walk_states.FINISHED
         yield resume
     branch = BranchStretches(workspace, control, code, state, spent, begun)
-    yield from along(branch, branch.size, 1.0)
+    yield from along(branch, branch.pace)
 
 
 def _no_start(balance: Balance, iterations: int, begun: float, status: BranchStatus) -> Stretch:

@@ -21,6 +21,7 @@ from solver.balance.balance import build
 from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, MEAN
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
+from solver.continuation.walk import Pace
 from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Real
@@ -32,7 +33,7 @@ from solver.scene.bodies.body import Load
 from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Sensitivities
 
-_FIRST, _LEAST, _MOST = 0.25, 1e-4, 60  # steps, as shares of the largest limit, and how many of them
+_PACE, _MOST = Pace(first=0.25, least=1e-4, grow=1.5), 60  # steps of the largest limit, and how many
 _INSTANTS = 360
 
 
@@ -160,7 +161,7 @@ class _Search:
         for i in stuck:
             given, load = scene.contacts[i].friction, solution.contacts[i].load
             limits.append(0.0 if given is None else given.limit(float(np.abs(load).sum())))
-        self._scale = max(limits)
+        self._pace = _PACE.times(max(limits))
 
     def ends(self, which: int) -> tuple[float, float]:
         """Least and largest of one of the numbers reached."""
@@ -186,29 +187,29 @@ class _Search:
 
     def _reach(self, here: _Reached, way: Real) -> None:
         """Go as far along a direction as the contacts can hold the forces."""
-        step, solves = _FIRST * self._scale, 0
-        while step > _LEAST * self._scale and solves < _MOST:
+        step, solves = self._pace.first, 0
+        while step > self._pace.least and solves < _MOST:
             solves += 1
             there = self._at(here.forces + step * way, here.u)
             if there is None:
-                step *= 0.5
+                step = self._pace.shorter(step)
             else:
                 here = there
 
     def _climb(self, here: _Reached, sign: float) -> None:
         """Go uphill (or down, `sign` −1) while the contacts can hold the forces."""
-        step, solves = _FIRST * self._scale, 0
+        step, solves = self._pace.first, 0
         ways = self._ways(here, sign)
-        while step > _LEAST * self._scale and solves < _MOST and ways:
+        while step > self._pace.least and solves < _MOST and ways:
             for way in ways:
                 solves += 1
                 there = self._at(here.forces + step * way, here.u)
                 if there is not None and sign * (there.numbers[0] - here.numbers[0]) > 0.0:
-                    here, step = there, 1.5 * step
+                    here, step = there, self._pace.after(step)
                     ways = self._ways(here, sign)
                     break
             else:
-                step *= 0.5
+                step = self._pace.shorter(step)
 
     def _ways(self, here: _Reached, sign: float) -> list[Real]:
         """Return the gradient's direction, and each force alone on its side of it."""

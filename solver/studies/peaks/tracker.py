@@ -37,7 +37,7 @@ from solver.continuation.extrema.kernels.peak_state import (
     summit_numbers,
     summit_seconds,
 )
-from solver.continuation.walk import walk
+from solver.continuation.walk import Pace, walk
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
 from solver.linear.contact_table import second_numbers
@@ -327,7 +327,7 @@ class Tracker(Looking):
         self.check()
         ridge = self._ridge(seed.z, stop, fixed=seed.fixed)
         peak = FollowedPeak(self._system, self._summit, ridge, seed)
-        for count in walk(peak, ridge.first_step, ridge.smallest_step):
+        for count in walk(peak, Pace(first=ridge.first_step, least=ridge.smallest_step)):
             self.check()
             if count == MOST_ROWS:
                 break

@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 
 from solver.continuation.bracketing import closing_in, dense_between, least_between, level_up_to
-from solver.continuation.walk import Curve, walk
+from solver.continuation.walk import Curve, Pace, walk
 
 
 class Circle(Curve[float]):
@@ -37,7 +37,7 @@ class Circle(Curve[float]):
 
 def test_steps_are_halved_and_what_none_is_short_enough_for_is_leapt_over_once() -> None:
     circle = Circle()
-    angles = list(walk(circle, 0.4, 1e-3))
+    angles = list(walk(circle, Pace(first=0.4, least=1e-3)))
     assert angles == sorted(angles)
     assert circle.leaps == 1
     assert circle.tries > len(angles)
@@ -50,8 +50,17 @@ def test_a_curve_without_a_leap_ends_where_no_step_is_short_enough() -> None:
         def leapt(self) -> tuple[float | None, float]:
             return Curve.leapt(self)
 
-    angles = list(walk(Lost(), 0.05, 1e-3))
+    angles = list(walk(Lost(), Pace(first=0.05, least=1e-3)))
     assert 0.5 * math.pi - 3e-3 < angles[-1] < 0.5 * math.pi
+
+
+def test_steps_grow_behind_easy_points_and_shrink_behind_hard_ones() -> None:
+    pace = Pace(first=0.1, least=1e-3, largest=0.4, grow=1.6, shrink=0.4, easy=5, hard=9).times(10.0)
+    assert (pace.first, pace.least, pace.largest) == (1.0, 0.01, 4.0)
+    assert [pace.after(1.0, effort) for effort in (5, 6, 8, 9)] == [1.6, 1.0, 1.0, 0.5]
+    assert pace.after(3.0) == 4.0
+    assert pace.after(0.015, 9) == 0.01
+    assert [pace.shorter(1.0), pace.shorter(1.0, 0.5)] == [0.4, 0.5]
 
 
 @pytest.mark.parametrize("root", [1e-9, 0.2, 0.7321, 1.0 - 1e-9])

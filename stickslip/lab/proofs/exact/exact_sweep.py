@@ -25,7 +25,7 @@ from solver.continuation.parameter_scale import check_range
 from solver.continuation.branch import Band, Edge, Peak
 from solver.continuation.stretches import Course
 from solver.continuation.walk import ContinuationSettings
-from solver.continuation.walk import Curve, walk
+from solver.continuation.walk import Curve, Pace, walk
 from solver.errors import SettingError
 from solver.jit.timer import clock
 from solver.response.contact_response import code_of
@@ -37,7 +37,7 @@ from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 
 _OFF = 0.02  # of the highest amplitude so far, by which a point may lie beside what is foreseen
-_FIRST, _LARGEST, _SMALLEST = 1.0 / 64, 1.0 / 24, 1e-5  # steps, of the range
+_PACE = Pace(first=1.0 / 64, least=1e-5, largest=1.0 / 24, easy=0.3)  # of the range
 _LAST_TRIED = 1.0 / 1024  # of the range: nearer to where there is no response than that the branch ends
 _SUPERHARMONICS = 5  # a resonance is met at its frequency over 1 … that
 _BESIDE = (-4.0, -1.0, 0.0, 1.0, 4.0)  # half-widths from a resonance at which the walk stops
@@ -121,7 +121,7 @@ class OrbitWalk(Curve[Point]):
         self.beyond: Solution | None = None
         self.rejected, self._most = 0, most
         stops, self._undamped = _resonances(orbits, first, last)
-        self._span = abs(last - first)
+        self._pace, self._least = _PACE.times(abs(last - first)), _LAST_TRIED * abs(last - first)
         self._ahead: list[tuple[float, Point | None]] = [(value, None) for value in (last, *stops)]
 
     def points(self) -> Iterator[Point]:
@@ -131,7 +131,7 @@ class OrbitWalk(Curve[Point]):
             self._lost(first, BranchStatus.NO_START)
             return
         yield self._kept(first)
-        yield from walk(self, _FIRST * self._span, _SMALLEST * self._span)
+        yield from walk(self, self._pace)
 
     @property
     def ended(self) -> bool:
@@ -147,8 +147,7 @@ class OrbitWalk(Curve[Point]):
             target, gap = here.value + math.copysign(size, target - here.value), size
         new = self.orbits.at(target, here) if known is None else known
         off = self._off(new) if new.solution.converged else math.inf
-        smallest = _SMALLEST if new.solution.converged else _LAST_TRIED
-        if off > 1.0 and gap > smallest * self._span:
+        if off > 1.0 and gap > (self._pace.least if new.solution.converged else self._least):
             self.rejected += 1
             self._ahead += [(target, new), (0.5 * (here.value + target), None)]
             return None, gap
@@ -160,7 +159,7 @@ class OrbitWalk(Curve[Point]):
         if not new.solution.converged:
             self._lost(new, BranchStatus.STALLED)
             return None, 0.0
-        return self._kept(new), min(_LARGEST * self._span, gap * (2.0 if off < 0.3 else 1.0))
+        return self._kept(new), self._pace.after(gap, off)
 
     def _kept(self, new: Point) -> Point:
         """Stand at a point."""
