@@ -15,6 +15,7 @@ import numpy as np
 
 from solver.balance.simplifications import Effects
 from solver.continuation.branch import BranchStatus
+from solver.continuation.walk import Pace
 from solver.errors import SettingError, check_count
 from solver.first_use import renamed
 from solver.jit.timer import clock
@@ -43,7 +44,7 @@ SHORT = 5e-3  # share of the range: a line in a gap that is shorter is followed 
 THOROUGHLY = 3.0  # times the work allowed, where other basins are looked for thoroughly
 _STARTS = (0.5, 0.25, 0.75, 0.0, 1.0)  # shares of the range where the first sweep is tried
 _PACE = TrackingPace(
-    first_step=0.02, largest_step=0.25, smallest_step=1e-3, height_error=6e-3, omega_error=2e-3, above=1.005,
+    steps=Pace(first=0.02, least=1e-3, largest=0.25), height_error=6e-3, omega_error=2e-3, above=1.005,
     slack=0.2, climb_from=4e-3,
 )  # fmt: skip
 

@@ -19,7 +19,7 @@ from solver.continuation.branch import Branch, Peak
 from solver.continuation.branches.sweep import sweep, walk
 from solver.continuation.extrema.extrema import Rival, crests
 from solver.continuation.stretches import Course, Stretch
-from solver.continuation.walk import ContinuationSettings
+from solver.continuation.walk import ContinuationSettings, Pace
 from solver.jit.fourier import Integer
 from solver.scene.scene import Scene
 from solver.studies.peaks.track_results import TrackStatus
@@ -30,9 +30,9 @@ from solver.studies.peaks.work_limit import Allowance, HaltedError
 class TrackingPace:
     """How closely peaks are followed."""
 
-    first_step: Annotated[float, "Share of the range."]
-    largest_step: Annotated[float, "Likewise."]
-    smallest_step: Annotated[float, "Likewise."]
+    steps: Annotated[
+        Pace, "Shares of the range; the error of each says how long the next is."
+    ]
     height_error: Annotated[float, "Relative error of the trapezoidal rule allowed in a step."]
     omega_error: Annotated[float, "Likewise."]
     above: Annotated[
@@ -48,8 +48,8 @@ class TrackingPace:
 
 
 EVERYWHERE = TrackingPace(
-    first_step=0.02, largest_step=0.125, smallest_step=1e-4, height_error=3e-3, omega_error=1e-3,
-    above=math.inf, slack=0.0, climb_from=math.inf,
+    steps=Pace(first=0.02, least=1e-4, largest=0.125), height_error=3e-3, omega_error=1e-3, above=math.inf,
+    slack=0.0, climb_from=math.inf,
 )  # fmt: skip
 
 

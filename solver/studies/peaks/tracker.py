@@ -89,7 +89,7 @@ class Tracker(Looking):
         super().__init__(scene, parameter, start, stop, harmonics, effects, pace, allowance)
         check_laws(self.balance.scene)
         check_measure(self.balance.scene)
-        self._first_step = pace.first_step
+        self._first_step = pace.steps.first
         self.exact_between: set[tuple[float, float, float]] = set()  # z, z and height of rows: cubics hold
         self._system: System = by_reference(self.balance.system)
         self._summit: Summit = new_summit(self._system)
@@ -130,7 +130,7 @@ class Tracker(Looking):
         self._asked_at[look.z] += 1
         if self._asked_at[look.z] > AGAIN:
             return False  # what is followed from there is not what was seen there
-        self._first_step = min(self._pace.first_step, CAREFUL if careful else math.inf)
+        self._first_step = min(self._pace.steps.first, CAREFUL if careful else math.inf)
         for peak in look.peaks:
             if peak.value >= share * look.top and not self.known(look.z, peak, solved):
                 self._follow(look.z, peak, ks)
@@ -155,7 +155,7 @@ class Tracker(Looking):
         Whether there is a new line.
         """
         before, z = len(self.lines), glance.z
-        self._first_step = self._pace.first_step
+        self._first_step = self._pace.steps.first
         seed = self._seed_of(z, guess, glance.ks)
         _, rows, solutions, _, sign = self._track(seed, z)
         if len(rows) == 0 or rows[0, HEIGHT] < share * self.envelope(np.array([z]))[0]:
@@ -257,7 +257,7 @@ class Tracker(Looking):
             waiting += leavings(line, self._band)
             self._crossings += crossings(line, self._band)
             if line.fixed:
-                waiting += entries(line, self._band, self, self._pace.smallest_step * self.scale.span)
+                waiting += entries(line, self._band, self, self._pace.steps.least * self.scale.span)
 
     def _line(self, seed: Seed) -> Line | None:
         """Return the line through a peak; None if there is nothing to follow."""
@@ -280,7 +280,7 @@ class Tracker(Looking):
         if seed.fixed:
             return passes(self.lines, seed, EXACTLY, SAME)
         one = BandEndCrossing(z=seed.z, edge=nearest(self._band, seed.omega), sign=seed.sign)
-        near = CROSSING * self._pace.smallest_step * self.scale.span
+        near = CROSSING * self._pace.steps.least * self.scale.span
         known = any(one.same(other, near) for other in self._crossings)
         self._crossings.append(one)
         return known or passes(self.lines, seed, 2.0 * SAME, SAME)
@@ -310,16 +310,21 @@ class Tracker(Looking):
         low, high = self._scene.observe.band
         return 2.0 * math.pi * low, 2.0 * math.pi * high
 
+    @property
+    def _steps(self) -> Pace:
+        """The steps of z of the lines to come."""
+        own, first = self._pace.steps, self._first_step
+        return replace(own, first=first, least=min(own.least, ENDING * first)).times(self.scale.span)
+
     def _ridge(self, start: float, stop: float, *, fixed: bool) -> Ridge:
-        (low, high), pace, span = self._band, self._pace, self.scale.span
+        (low, high), pace, steps = self._band, self._pace, self._steps
         if fixed:  # the end of the band itself, and rounding of it, is inside
             low, high = low * (1.0 - ROUNDING), high * (1.0 + ROUNDING)
         return Ridge(
             start=start, stop=stop, logarithmic=self.scale.logarithmic, low=low, high=high, fixed=fixed,
-            first_step=self._first_step * span, largest_step=pace.largest_step * span,
-            smallest_step=min(pace.smallest_step, ENDING * self._first_step) * span,
+            first_step=steps.first, largest_step=steps.largest, smallest_step=steps.least,
             height_error=pace.height_error, omega_error=pace.omega_error, enough=self.enough,
-            slack=pace.slack, climb_from=pace.climb_from * span,
+            slack=pace.slack, climb_from=pace.climb_from * self.scale.span,
         )  # fmt: skip
 
     def _track(self, seed: Seed, stop: float) -> tuple[LineEnd, Real, Real, Real, float]:
@@ -327,7 +332,7 @@ class Tracker(Looking):
         self.check()
         ridge = self._ridge(seed.z, stop, fixed=seed.fixed)
         peak = FollowedPeak(self._system, self._summit, ridge, seed)
-        for count in walk(peak, Pace(first=ridge.first_step, least=ridge.smallest_step)):
+        for count in walk(peak, self._steps):
             self.check()
             if count == MOST_ROWS:
                 break
