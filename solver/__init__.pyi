@@ -46,9 +46,8 @@ from .modes.peaks.performance import (
     PerformanceCurve as PerformanceCurve,
     performance_curve as performance_curve,
 )
+from stickslip.lab.controlled.held_result import HeldAmplitude as HeldAmplitude, HeldStatus as HeldStatus
 from .modes.mode_results import (
-    HeldAmplitude as HeldAmplitude,
-    HeldStatus as HeldStatus,
     NonlinearMode as NonlinearMode,
     NonlinearModeStatus as NonlinearModeStatus,
     PhaseResonance as PhaseResonance,
@@ -70,7 +69,7 @@ from stickslip.lab.all_solutions.all_solutions import (
 from .response.stability.bifurcations import bifurcations as bifurcations
 from .response.stability.floquet import branch_stability as branch_stability, stability as stability
 from .response.stability.multipliers import Growth as Growth, Stability as Stability
-from .response.stability.residual_forces import (
+from stickslip.lab.all_solutions.residual_forces import (
     AmplitudeRange as AmplitudeRange,
     amplitude_range as amplitude_range,
 )

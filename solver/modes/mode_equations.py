@@ -13,7 +13,7 @@ with x_k = Z_k⁻¹ (φ_k − Lᴴ F_k). `g` fixes the phase: harmonic 1 lags a 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -322,6 +322,80 @@ class Forced(Equations):
         force = np.zeros((s.ks.size, s.force.size), np.complex128)
         force[s.first] = self.unit * s.force
         return force
+
+
+class Held(Forced):
+    """The responses with a given harmonic 1, or max|x|, of the observed DOF; the last unknown is z.
+
+    They are those of the balance under the force z c f with ln (|o x_1| / A) = 0 and ln ω − λ = 0, o the row
+    of the DOF, in place of phase and modal amplitude; the curve is followed over λ = ln ω.
+
+    Attributes
+    ----------
+    target : A [m].
+    unit : c, the factor on the excitation that z counts in.
+    whole : max|x| is held, not harmonic 1 alone.
+    """
+
+    def __init__(self, balance: Balance) -> None:
+        super().__init__(balance)
+        self.target, self.whole = 1.0, False
+
+    def over(self, balance: Balance) -> Held:
+        """Return the same question to another balance of the scene."""
+        other = Held(balance)
+        other.target, other.unit, other.whole = self.target, self.unit, self.whole
+        return other
+
+    def follows(self, before: Real, y: Real) -> bool:
+        """Return whether z keeps its sign: it can not pass 0, where the force would feed nothing.
+
+        Over a sharp resonance a long step would: the force that turns by half a period within it is the same
+        with the other sign.
+        """
+        return bool(before[-1] * y[-1] > 0.0)
+
+    def _seen(self, x: Complex) -> tuple[float, Complex]:
+        """Return what is held [m], and c (nk, N) of its change Re Σ c_kᴴ dx_k."""
+        s = self.structure
+        if not self.whole:
+            seen = complex(np.sum(s.observe[s.first] * x[s.first]))
+            row = np.zeros_like(x)
+            row[s.first] = s.observe[s.first].conj() * seen / max(abs(seen), 1e-300)
+            return abs(seen), row
+        return self.top(x)
+
+    def _second_last(self, x: Complex, _turned: Complex) -> Complex:
+        """Return c of the change of the logarithm of what is held."""
+        size, row = self._seen(x)
+        return row / max(size, 1e-300)
+
+    def _assemble(
+        self, w: Real, q: complex, forces: Real, x: Complex, by_omega: Complex, dynamics: Dynamics,
+        log_amplitude: float, phase: Complex,
+    ) -> Evaluated:  # fmt: skip
+        """Put residual and Jacobian together; `log_amplitude` is λ."""
+        s, size, omega = self.structure, self.size, math.exp(log_amplitude)
+        at = super()._assemble(w, q, forces, x, by_omega, dynamics, log_amplitude, phase)
+        residual, J = at.residual, at.jacobian
+        residual[size + 2] = math.log(max(self._seen(x)[0], 1e-300) / self.target)
+        # q is counted in what moves; `relative_residual` counts it in e^λ.
+        unit = omega / max(math.sqrt(s.squared_amplitude(x)), 1e-300)
+        residual[size : size + 2] *= unit
+        J[size : size + 2] *= unit
+        J[size + 3] = 0.0
+        return replace(at, lag=1.0)
+
+    def at_frequency(self, at: Evaluated, omega: float, log_omega: float) -> Evaluated:
+        """Return the equations with ln ω − λ in their last row."""
+        at.residual[-1] = math.log(omega) - log_omega
+        at.jacobian[-1, -2] = 1.0 / omega
+        return at
+
+    def evaluate(self, y: Real, log_amplitude: float, phase: Complex, mode: int) -> Evaluated | None:
+        """Return the equations at y, at λ = `log_amplitude`; None where a law failed or Z is singular."""
+        at = super().evaluate(y, log_amplitude, phase, mode)
+        return None if at is None else self.at_frequency(at, float(y[-2]), log_amplitude)
 
 
 def _block_places(balance: Balance) -> Integer:

@@ -20,6 +20,7 @@ from typing import Annotated
 import numpy as np
 
 from solver.contacts.laws.contact_parts import Slider
+from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
@@ -29,6 +30,7 @@ from solver.linear.model import LinearModel, LinearModelDerivative
 from solver.matrices.normal_modes import least_stiffness
 from solver.response.contact_response import ContactResponse, ContactState
 from solver.response.solution import Solution
+from solver.scene.bodies.body import Load
 from solver.scene.scene import Scene
 
 # A force with a circular limit that differs from kt u + c by less, relative to it, has not slipped.
@@ -192,3 +194,51 @@ def mean_gain_slopes(model: LinearModel, by: Mapping[int, LinearModelDerivative]
 def _by_sector(rows: list[Complex]) -> Real:
     """Return numbers of each nodal diameter as those of each sector."""
     return np.asarray(np.fft.fft(np.array(rows), axis=0).real / len(rows))
+
+
+@dataclass(frozen=True, slots=True)
+class LeftForces:
+    """Forces that contacts which stick go on holding, as constant loads on the parts they join.
+
+    `sliding` are the contacts' numbers with the relative motion that each force is along.
+    """
+
+    sliding: tuple[tuple[int, int], ...]
+    terms: tuple[tuple[str, str, int, float], ...]
+
+    @classmethod
+    def of(cls, scene: Scene, stuck: Sequence[int]) -> LeftForces:
+        """Return the forces of contacts, by their numbers; SettingError where one joins two sectors."""
+        sliding = tuple((i, port) for i in stuck for port in scene.contacts[i].RUBBING)
+        forms = [scene.forms[i][port] for i, port in sliding]
+        if any(term.next for form in forms for term in form):
+            raise SettingError("scene", "contacts", "must not join one sector with the next")
+        terms = tuple(
+            (f"left-{k}-{j}", term.dof, k, term.factor)
+            for k, form in enumerate(forms)
+            for j, term in enumerate(form)
+        )
+        return cls(sliding, terms)
+
+    @property
+    def paths(self) -> list[str]:
+        """The parameters of a scene with them that they are."""
+        return [f"{name}.force" for name, *_ in self.terms]
+
+    def by_force(self, slopes: Real) -> Real:
+        """Return derivatives (…, forces) by the forces from those by `paths`."""
+        spread = np.zeros((len(self.terms), len(self.sliding)))
+        for row, (_, _, k, factor) in enumerate(self.terms):
+            spread[row, k] = -factor
+        return np.asarray(slopes @ spread)
+
+    def on(self, scene: Scene, forces: Real) -> Scene:
+        """Return a scene whose contacts stick whatever they carry, with the forces left in them as loads."""
+        stuck = {i for i, _ in self.sliding}
+        contacts = tuple(
+            contact.held_fast() if i in stuck else contact for i, contact in enumerate(scene.contacts)
+        )
+        loads = tuple(
+            Load(name=name, dof=dof, force=-float(forces[k]) * factor) for name, dof, k, factor in self.terms
+        )
+        return scene.model_copy(update={"contacts": contacts, "loads": (*scene.loads, *loads)})

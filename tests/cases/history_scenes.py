@@ -81,3 +81,42 @@ def _contact(rng: np.random.Generator, name: str, dofs: list[str], force: float,
             "prestressed": bool(rng.random() < 0.5), "kt_second": float(10.0 ** rng.uniform(0.5, 3.0)),
         }  # fmt: skip
     return contact
+
+
+def plane_scene(load: dict[str, Any], directions: dict[str, list[float]], **contact: Any) -> Scene:
+    """Oscillators of 1 kg, [k, c, force, phase] each, and a contact along x and y with a limit for each."""
+    ends = {"between": "x", "between_second": "y"} | ({"normal_between": "z"} if "kn" in contact else {})
+    law = "coulomb-3d" if "kn" in contact else "coulomb-2d"
+    return Scene.from_dict(
+        {
+            "name": "plane",
+            "structure": {
+                "kind": "lumped",
+                "masses": dict.fromkeys(directions, 1.0),
+                "springs": [
+                    {"between": [dof, "ground"], "k": k, "c": c} for dof, (k, c, _, _) in directions.items()
+                ],
+            },
+            "contacts": [
+                {"name": "c", "law": law, "limit": "box", "mu": 0.5, **load, **contact}
+                | {key: [dof, "ground"] for key, dof in ends.items()}
+            ],
+            "excitation": [
+                {"dof": dof, "amplitude": force, "phase": phase}
+                for dof, (_, _, force, phase) in directions.items()
+            ],
+            "observe": {"dof": "y", "band": [0.5, 5.0]},
+        }
+    )
+
+
+BOX = {"x": [95.9420458, 0.42562, 66.652313, 0.0], "y": [12.0438248, 0.2104916, 53.7568487, 2.4016075]}
+
+
+def moving_plane() -> Scene:
+    """One direction slips under a load that moves, and the other sticks."""
+    directions = {
+        "x": [101.741, 0.552604, 67.831882, 0.664438], "y": [44.603, 0.528111, 104.322701, 1.270637],
+        "z": [223.707, 0.125813, 99.640687, 4.364217],
+    }  # fmt: skip
+    return plane_scene({"N0": 147.137634}, directions, kt=216.934905, kn=93.490037, prestressed=True)

@@ -21,7 +21,7 @@ from solver.continuation.bracketing import least_between
 from solver.errors import SettingError
 from solver.jit.fourier import Complex
 from solver.modes.corrector import Corrected, ModeState, correct
-from solver.modes.held_amplitude import Held
+from solver.modes.mode_equations import Held
 from solver.modes.mode_records import Recorder
 from solver.modes.nonlinear_mode import pose
 from solver.results.told import Piece

@@ -30,9 +30,7 @@ from solver.studies.peaks.work_limit import Allowance, HaltedError
 class TrackingPace:
     """How closely peaks are followed."""
 
-    steps: Annotated[
-        Pace, "Shares of the range; the error of each says how long the next is."
-    ]
+    steps: Annotated[Pace, "Shares of the range; the error of each says how long the next is."]
     height_error: Annotated[float, "Relative error of the trapezoidal rule allowed in a step."]
     omega_error: Annotated[float, "Likewise."]
     above: Annotated[

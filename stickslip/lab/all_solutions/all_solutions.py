@@ -23,7 +23,7 @@ from solver.response.solve import describe
 from solver.response.stability import MOST_STARTS
 from solver.response.stability.floquet import stability
 from solver.response.stability.multipliers import Stability, verdict_of
-from solver.response.stability.residual_forces import AmplitudeRange, amplitude_range
+from stickslip.lab.all_solutions.residual_forces import AmplitudeRange, amplitude_range
 from stickslip.lab.all_solutions.solution_search import SolutionSearch
 from solver.response.stability.uniqueness import Uniqueness, uniqueness
 from solver.results.known import Stable, Verdict

@@ -1,9 +1,16 @@
-"""Responses over the frequency at a held amplitude, as rigs with amplitude control run: `held_amplitude`."""
+"""Responses at a held amplitude: the force that keeps harmonic 1 of one DOF at A, over the frequency.
+
+Test rigs are run so, because the amplitude settles the state of the contacts: response by response hardly
+anything changes but the phase, folds of the response to a held force vanish, and its unstable parts are
+reached (T. Karaağaçlı, H. N. Özgüven, Mech. Syst. Signal Process. 146 (2021) 107023,
+doi:10.1016/j.ymssp.2020.107023). The equations are `solver.modes.mode_equations.Held`.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -11,14 +18,16 @@ import numpy as np
 from solver.balance.speed_line import check_no_line
 from solver.errors import SettingError
 from solver.jit.timer import clock
-from solver.jit.fourier import Real
-from solver.modes.corrector import Corrected
+from solver.jit.fourier import Real, cosine_position
+from solver.modes.corrector import Corrected, ModeState, correct
 from solver.modes.mode_curve import FollowedCurve, follow
-from solver.modes.held_amplitude import Held, first_held, least_force
+from solver.modes.mode_equations import Held
+from solver.modes.mode_start import slopes_at_rest
+from solver.continuation.bracketing import least_between
 from solver.response.stability.cost import left_out
 from solver.modes.nonlinear_mode import LEAST, MOST_POINTS, pose
 from solver.modes.mode_records import PointRecord, Recorder, Wider, last_unknowns, told_of
-from solver.modes.mode_results import HeldAmplitude, HeldStatus, LeastForce
+from stickslip.lab.controlled.held_result import HeldAmplitude, HeldStatus, LeastForce
 from solver.response.stability.floquet import motions_stability
 from solver.scene.parameter_paths import check_frequency
 
@@ -28,6 +37,13 @@ if TYPE_CHECKING:
 LEVEL = "excitation.amplitude"
 _FAINT = 1e-12  # share of a motion in phase with the force below which the amplitude has no force to hold it
 _SAME = 1e-9  # relative distance of an end of the range within which a point is at it
+
+
+_RUNGS = 24  # of amplitude, each `_RISE` times the one before, from which a start is walked up
+_RISE = 1.6
+_MOST_AT_FIRST = 60
+_LEAST_RISE = 1.01
+_CLOSE, _MOST_TRIES = 1e-9, 60  # of ln ω, where the force is least
 
 
 def held_amplitude(
@@ -164,3 +180,104 @@ def _stable(
         except SettingError as error:  # a law or a term without a motion in time
             return (None,) * len(rows), str(error)
     return tuple(found), ""
+
+
+def first_held(equations: Held, rest: Real, omega: float) -> Corrected:
+    """Return the response at ω with the amplitude asked for; from smaller ones upward where it must.
+
+    Parameters
+    ----------
+    rest : (r, n) the equilibrium at the leading ports.
+    """
+    wanted = equations.target
+    guess = _linear(equations, rest, omega)
+    found = _solved(equations, guess)
+    for rung in range(1, _RUNGS + 1):
+        if found.converged:
+            break
+        equations.target = wanted / _RISE**rung
+        found = _solved(equations, _scaled(equations, guess, rest, _RISE**-rung))
+    spent, rise = found.iterations, _RISE
+    while found.converged and equations.target < wanted:
+        before = equations.target
+        equations.target = min(before * rise, wanted)
+        raised = _scaled(equations, found.state, rest, equations.target / before)
+        there = _solved(equations, raised)
+        spent += there.iterations
+        if there.converged:
+            found, rise = there, min(rise * rise, _RISE)
+            continue
+        equations.target, rise = before, math.sqrt(rise)
+        if rise < _LEAST_RISE:
+            found = replace(there, converged=False)
+    equations.target = wanted
+    return replace(found, iterations=spent)
+
+
+def _solved(equations: Held, guess: ModeState) -> Corrected:
+    """Return the solution from a guess; converged only with a force in its own phase, z > 0."""
+    found = correct(equations, guess, most=_MOST_AT_FIRST)
+    return found if found.state.y[-1] > 0.0 else replace(found, converged=False)
+
+
+def least_force(equations: Held, points: Sequence[Corrected]) -> Corrected | None:
+    """Return the point with the least force, solved for between points; None without a point.
+
+    A force held instead has a peak there: |x| is stationary over the frequency where the force is.
+    """
+    if not points:
+        return None
+    i = int(np.argmin([point.state.y[-1] for point in points]))
+    best = points[i]
+    if not 0 < i < len(points) - 1:
+        return best
+    tried = [best]
+
+    def at(log_omega: float) -> Corrected | None:
+        near = min(tried, key=lambda each: abs(each.state.log_amplitude - log_omega))
+        y = near.state.y.copy()
+        y[-2] = math.exp(log_omega)
+        found = correct(equations, replace(near.state, y=y, log_amplitude=log_omega), most=_MOST_AT_FIRST)
+        if not found.converged or not found.state.y[-1] > 0.0:
+            return None
+        tried.append(found)
+        return found
+
+    def force(point: Corrected) -> float:
+        return float(point.state.y[-1])
+
+    low, high = sorted((points[i - 1].state.log_amplitude, points[i + 1].state.log_amplitude))
+    least_between(at, force, low, high, _CLOSE, _MOST_TRIES, 2.0 * max(map(force, points)))
+    return min(tried, key=force)
+
+
+def _linear(equations: Held, rest: Real, omega: float) -> ModeState:
+    """Return a guess: the response with the contacts as they are at rest, in the amplitude asked for."""
+    s, first = equations.structure, equations.structure.first
+    number = s.nearest(omega, 0.0)
+    slopes = slopes_at_rest(equations, rest, omega)
+    span = np.eye(equations.r) if equations.span is None else equations.span
+    shift = np.diag(equations.balance.system.shift).astype(np.complex128)
+    tied = np.zeros_like(shift) if slopes is None else slopes - shift
+    K = s.back[first] @ (span.T @ tied @ span) @ s.contact[first]
+    x = np.linalg.lstsq(s.stiffness(omega) + K, s.force, rcond=1e-14)[0]
+    seen = abs(complex(np.sum(s.observe[first] * x)))
+    factor = equations.target / max(seen, 1e-300)
+    equations.unit = factor
+    x = factor * x
+    moved = s.contact[first] @ x
+    w, here = rest.copy(), int(cosine_position(s.ks, first))
+    if equations.size:
+        w[:, here], w[:, here + 1] = moved.real, -moved.imag
+    q = complex(np.vdot(s.carried[:, number], x))
+    y = np.concatenate([w.reshape(-1), [q.real, q.imag, omega, 1.0]])
+    return ModeState(
+        y=y, log_amplitude=math.log(omega), mode=number, phase=np.zeros(s.force.size, np.complex128)
+    )
+
+
+def _scaled(equations: Held, state: ModeState, rest: Real, factor: float) -> ModeState:
+    """Return a guess with what moves, and the force, times a factor."""
+    guess = state.scaled(equations.size, factor, rest.reshape(-1))
+    guess.y[-1] *= factor
+    return guess

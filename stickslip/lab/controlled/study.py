@@ -31,7 +31,7 @@ class Controlled(Study, HarmonicRequest):
     EXAMPLES = ({"scene": "two-dof", "amplitude": 1.0},)
     NAME, FUNCTION = "controlled", "solver:held_amplitude"
     RESULT = answered(
-        "solver.modes.mode_results:HeldAmplitude",
+        "stickslip.lab.controlled.held_result:HeldAmplitude",
         "ControlledResult",
         changes=list[Table],
         least=Table | None,

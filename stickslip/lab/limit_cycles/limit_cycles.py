@@ -21,7 +21,7 @@ import numpy as np
 
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
-from solver.modes.along import CurveSegment, points_of, with_turns, zeta_of
+from stickslip.lab.limit_cycles.curve_segment import CurveSegment, points_of, with_turns, zeta_of
 from solver.modes.corrector import Corrected
 from solver.modes.mode_curve import CurveEnd, follow
 from solver.modes.mode_equations import Equations

@@ -16,7 +16,7 @@ import numpy as np
 
 from solver.errors import SettingError
 from solver.jit.fourier import Complex
-from solver.modes.along import with_turns, zeta_of
+from stickslip.lab.limit_cycles.curve_segment import with_turns, zeta_of
 from solver.modes.corrector import Corrected, ModeState, correct
 from solver.modes.mode_curve import CurveEnd, follow, tangent_of
 from solver.modes.mode_equations import Equations

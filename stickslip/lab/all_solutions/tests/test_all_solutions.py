@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from history_scenes import BOX, moving_plane, plane_scene
 from marched_map import MarchedMap
 from moving_scenes import bending_scene, moving_scene
 from scene_cases import duffing, two_dof
@@ -179,6 +180,24 @@ def test_residual_forces_under_given_loads_move_the_mean_alone():
     assert found.mean == solution.mean_range
     assert found.half_peak_to_peak == (solution.half_peak_to_peak,) * 2
     assert amplitude_range(solve(two_dof(), frequency_hz=1.2, harmonics=5)) is None
+
+
+def test_of_two_directions_that_slip_apart_one_keeps_what_it_slipped_on_its_way():
+    solution = solve(
+        plane_scene({"N0": 100.0, "kt": 123.2448494}, BOX), frequency_hz=2.843074977332252, harmonics=25
+    )
+    rest = march(solution.scene, frequency_hz=2.843074977332252)
+    found = amplitude_range(solution)
+    assert found is not None
+    assert found.exact
+    assert found.max_abs[0] <= rest.max_abs <= found.max_abs[1]
+
+
+def test_one_direction_that_slips_under_a_moving_load_is_not_searched():
+    found = amplitude_range(solve(moving_plane(), frequency_hz=1.02188))
+    assert found is not None
+    assert found.contacts == ("c",)
+    assert math.isnan(found.max_abs[0])
 
 
 @pytest.mark.parametrize(("name", "value"), [("starts", -1), ("starts", 2.5), ("seed", -3)])

@@ -11,7 +11,6 @@ reached; a wider one is not excluded.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -22,15 +21,12 @@ from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, MEAN
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.continuation.walk import Pace
-from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.response.contact_response import ContactState, contact_responses
-from solver.response.held_contacts import held_sliders
+from solver.response.held_contacts import LeftForces, held_sliders
 from solver.response.solution import Solution
 from solver.results.told import Piece
-from solver.scene.bodies.body import Load
-from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Sensitivities
 
 _PACE, _MOST = Pace(first=0.25, least=1e-4, grow=1.5), 60  # steps of the largest limit, and how many
@@ -88,54 +84,6 @@ def amplitude_range(solution: Solution, effects: Effects | None = None) -> Ampli
     return AmplitudeRange(
         max_abs=ends[0], half_peak_to_peak=ends[1], mean=ends[2], contacts=names, exact=False
     )
-
-
-@dataclass(frozen=True, slots=True)
-class LeftForces:
-    """Forces that contacts which stick go on holding, as constant loads on the parts they join.
-
-    `sliding` are the contacts' numbers with the relative motion that each force is along.
-    """
-
-    sliding: tuple[tuple[int, int], ...]
-    terms: tuple[tuple[str, str, int, float], ...]
-
-    @classmethod
-    def of(cls, scene: Scene, stuck: Sequence[int]) -> LeftForces:
-        """Return the forces of contacts, by their numbers; SettingError where one joins two sectors."""
-        sliding = tuple((i, port) for i in stuck for port in scene.contacts[i].RUBBING)
-        forms = [scene.forms[i][port] for i, port in sliding]
-        if any(term.next for form in forms for term in form):
-            raise SettingError("scene", "contacts", "must not join one sector with the next")
-        terms = tuple(
-            (f"left-{k}-{j}", term.dof, k, term.factor)
-            for k, form in enumerate(forms)
-            for j, term in enumerate(form)
-        )
-        return cls(sliding, terms)
-
-    @property
-    def paths(self) -> list[str]:
-        """The parameters of a scene with them that they are."""
-        return [f"{name}.force" for name, *_ in self.terms]
-
-    def by_force(self, slopes: Real) -> Real:
-        """Return derivatives (…, forces) by the forces from those by `paths`."""
-        spread = np.zeros((len(self.terms), len(self.sliding)))
-        for row, (_, _, k, factor) in enumerate(self.terms):
-            spread[row, k] = -factor
-        return np.asarray(slopes @ spread)
-
-    def on(self, scene: Scene, forces: Real) -> Scene:
-        """Return a scene whose contacts stick whatever they carry, with the forces left in them as loads."""
-        stuck = {i for i, _ in self.sliding}
-        contacts = tuple(
-            contact.held_fast() if i in stuck else contact for i, contact in enumerate(scene.contacts)
-        )
-        loads = tuple(
-            Load(name=name, dof=dof, force=-float(forces[k]) * factor) for name, dof, k, factor in self.terms
-        )
-        return scene.model_copy(update={"contacts": contacts, "loads": (*scene.loads, *loads)})
 
 
 @dataclass(frozen=True, slots=True)
