@@ -51,9 +51,8 @@ from service.settings import traces
 from service.settings.kinds import registry_of
 from service.settings.settings import Settings
 from service.uploads.uploads import Uploads
-from service.workers.answer_workers import Answers
 from service.workers.executors import executor_of
-from service.workers.preview_workers import Previews
+from service.workers.warm_pool import Answers, Previews
 from solver.jit import beside
 
 log = logging.getLogger("stickslip.service")

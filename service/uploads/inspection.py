@@ -9,8 +9,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import hashlib
-import json
-import multiprocessing as mp
 import os
 import shutil
 import signal
@@ -18,13 +16,11 @@ import threading
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 from service.errors import InvalidRequestError, QueueFullError, UnreadableUploadError, issues_to_json
-from service.workers.process_limits import address_space
-from service.workers.processes import start
+from service.workers.processes import EndedError, told_apart
 
 MEMORY_BYTES = 2 * 1024**3
 """Most that one reader may take, and all of them together beside what they are born with."""
@@ -101,24 +97,19 @@ def _ask(task: str, folder: Path, argument: Any, seconds: float, most_bytes: int
     inside = _INFLATED * sent if any(map(zipfile.is_zipfile, folder.iterdir())) else 0
     memory = min(_LEAST_BYTES + _TIMES * (sent + inside), MEMORY_BYTES)
     seconds *= max(1.0, sent / _USUAL_BYTES)
-    ours, theirs = mp.Pipe(duplex=False)
-    with (_budget if sent > _SMALL_BYTES else _budget_of_small).taken(memory), ours:
-        process = start(_main, (theirs, task, str(folder), argument, seconds, memory, writes), "reader")
-        theirs.close()
+    with (_budget if sent > _SMALL_BYTES else _budget_of_small).taken(memory):
         try:
-            if not ours.poll(seconds):
-                raise UnreadableUploadError(_TOO_LONG.format(seconds))
-            answer = json.loads(ours.recv_bytes(most_bytes))
-        except EOFError as error:
-            process.join(1.0)
-            raise UnreadableUploadError(_end(process.status(), seconds)) from error
+            answer = told_apart(
+                _in_folder, (task, str(folder), argument), "reader", seconds=seconds, most_bytes=most_bytes,
+                memory=memory, beside=True, writes=writes,
+            )  # fmt: skip
+        except TimeoutError as error:
+            raise UnreadableUploadError(_TOO_LONG.format(seconds)) from error
+        except EndedError as error:
+            raise UnreadableUploadError(_end(error.status, seconds)) from error
         except OSError as error:
             message = f"what it holds takes more than {most_bytes} bytes as text"
             raise UnreadableUploadError(message) from error
-        finally:
-            process.kill()
-            process.join()
-            process.close()
     if "issues" in answer:
         raise InvalidRequestError.from_json(answer["issues"])
     if "error" in answer:
@@ -168,36 +159,10 @@ _SMALL_BYTES = 1024**2
 """Files of so much together do not wait for large ones."""
 
 
-def _main(
-    connection: Connection,
-    task: str,
-    folder: str,
-    argument: Any,
-    seconds: float,
-    memory: int,
-    writes: int,
-) -> None:
-    """The life of the process, which may take `memory` beside what it is born with."""
-    limit_process(seconds, address_space() + memory, writes)
+def _in_folder(asked: tuple[str, str, Any]) -> dict[str, Any]:
+    task, folder, argument = asked
     os.chdir(folder)
-    # The other end may have lost its patience.
-    with contextlib.suppress(BrokenPipeError):
-        connection.send_bytes(json.dumps(_answer(task, argument), allow_nan=False).encode())
-
-
-def limit_process(seconds: float, memory: int, writes: int = 0) -> None:
-    """Limit the time [s], the memory and the files it writes [bytes] of this process."""
-    import resource
-
-    for what, value in (
-        (resource.RLIMIT_AS, memory),
-        (resource.RLIMIT_CPU, round(seconds) + 1),
-        (resource.RLIMIT_CORE, 0),
-        (resource.RLIMIT_FSIZE, writes),
-    ):
-        hard = resource.getrlimit(what)[1]
-        limit = value if hard == resource.RLIM_INFINITY else min(value, hard)
-        resource.setrlimit(what, (limit, limit))
+    return _answer(task, argument)
 
 
 def _answer(task: str, argument: Any) -> dict[str, Any]:

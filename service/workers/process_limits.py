@@ -82,6 +82,21 @@ class ProcessLimits:
 UNLIMITED = ProcessLimits()
 
 
+def limit_process(seconds: float, memory: int, writes: int = 0) -> None:
+    """Limit the time [s], the memory and the files it writes [bytes] of this process."""
+    import resource
+
+    for what, value in (
+        (resource.RLIMIT_AS, memory),
+        (resource.RLIMIT_CPU, round(seconds) + 1),
+        (resource.RLIMIT_CORE, 0),
+        (resource.RLIMIT_FSIZE, writes),
+    ):
+        hard = resource.getrlimit(what)[1]
+        limit = value if hard == resource.RLIM_INFINITY else min(value, hard)
+        resource.setrlimit(what, (limit, limit))
+
+
 def address_space() -> int:
     """Bytes of address space of this process."""
     import resource

@@ -14,6 +14,7 @@ the next start makes another fork server.
 from __future__ import annotations
 
 import contextlib
+import json
 import multiprocessing as mp
 import os
 import signal
@@ -22,11 +23,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from multiprocessing.connection import wait
+from multiprocessing.connection import Connection, wait
 from multiprocessing.context import BaseContext
 from multiprocessing.process import BaseProcess
 from typing import Any
 
+from service.workers.process_limits import address_space, limit_process
 from service.workers.worker import THREAD_LIMITS
 from solver.jit.beside import missing
 
@@ -139,6 +141,65 @@ def start(target: Callable[..., None], args: tuple[Any, ...], name: str) -> Proc
                 if time.monotonic() > until:
                     raise ConnectionAbortedError("what processes are forked off keeps ending") from error
                 time.sleep(_BETWEEN_SECONDS)
+
+
+class EndedError(Exception):
+    """A process ended without an answer."""
+
+    def __init__(self, status: int | None) -> None:
+        self.status = status
+        super().__init__(str(status))
+
+
+def told_apart(
+    task: Callable[[Any], Any], argument: Any, name: str, *, seconds: float, most_bytes: int,
+    memory: int, beside: bool = False, writes: int = 0,
+) -> Any:  # fmt: skip
+    """What a task finds in a process of its own, as JSON: nothing it answers is unpickled.
+
+    Parameters
+    ----------
+    task : at the top level of a module.
+    seconds : longest time, of the processor too [s].
+    most_bytes : of the answer.
+    memory, writes : most that it may have, and write to files [bytes].
+    beside : whether that is memory beside what it is born with.
+
+    Raises
+    ------
+    TimeoutError
+        It takes longer.
+    EndedError
+        It ended without an answer.
+    OSError
+        The answer is larger.
+    """
+    ours, theirs = mp.Pipe(duplex=False)
+    with ours:
+        process = start(_tell, (theirs, task, argument, seconds, memory, beside, writes), name)
+        theirs.close()
+        try:
+            if not ours.poll(seconds):
+                raise TimeoutError
+            return json.loads(ours.recv_bytes(most_bytes))
+        except EOFError as error:
+            process.join(1.0)
+            raise EndedError(process.status()) from error
+        finally:
+            process.kill()
+            process.join()
+            process.close()
+
+
+def _tell(
+    connection: Connection, task: Callable[[Any], Any], argument: Any, seconds: float, memory: int,
+    beside: bool, writes: int,
+) -> None:  # fmt: skip
+    """The life of such a process."""
+    limit_process(seconds, memory + (address_space() if beside else 0), writes)
+    # The other end may have lost its patience.
+    with contextlib.suppress(BrokenPipeError):
+        connection.send_bytes(json.dumps(task(argument), allow_nan=False).encode())
 
 
 def _started(target: Callable[..., None], args: tuple[Any, ...], name: str) -> Process:

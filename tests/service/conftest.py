@@ -18,7 +18,7 @@ from service_helpers import MakeSettings, serving, settings_of, with_tables
 from service.client.embedded import EmbeddedService
 from service.db.engine import Database
 from service.jobs.kinds import SHIPPED
-from service.uploads import inspection
+from service.workers import processes
 
 BACKENDS = ("sqlite", "postgresql")
 
@@ -62,8 +62,8 @@ def read_here(monkeypatch: pytest.MonkeyPatch) -> None:
         thread.start()
         return SimpleNamespace(kill=int, join=thread.join, close=theirs.close, status=int)
 
-    monkeypatch.setattr(inspection, "start", start)
-    monkeypatch.setattr(inspection, "limit_process", lambda *_: None)
+    monkeypatch.setattr(processes, "start", start)
+    monkeypatch.setattr(processes, "limit_process", lambda *_: None)
     monkeypatch.chdir(Path.cwd())  # the reader goes to the folder of the files; back afterwards
 
 

@@ -18,7 +18,7 @@ from service.errors import InvalidRequestError, QueueFullError, TooManyRequestsE
 from service.jobs.answering import Answering, Words
 from service.jobs.kind_registry import SceneSource, no_warm_up
 from service.settings.settings import Settings
-from service.workers.answer_workers import Answers
+from service.workers.warm_pool import Answers
 
 LIMITS = Settings(
     answer_workers=2, answer_seconds=0.5, answer_memory_bytes=64 * 1024**2, answer_budget_seconds=1000

@@ -16,7 +16,7 @@ from service.errors import ConflictError, InvalidRequestError, JobFailedError, P
 from service.jobs.kind_registry import JobKind, JobRequest, Registry, Resolved, SceneSource
 from service.jobs.kinds.previews import LIVE_UNKNOWNS, POINT_UNKNOWNS, harmonics_in_time
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
-from service.workers.preview_workers import MOST_WAITING, Previews
+from service.workers.warm_pool import MOST_WAITING, Previews
 from solver.errors import SettingError, SolverError
 
 TWO_DOF = {"scene": "two-dof"}

@@ -14,7 +14,7 @@ from service.jobs.kind_registry import JobKind, Registry
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.queue.health import readiness
 from service.workers import processes
-from service.workers.preview_workers import Previews
+from service.workers.warm_pool import Previews
 from solver.jit import beside
 from solver.jit.folder import folder
 

@@ -6,18 +6,15 @@ WeasyPrint prints it, which needs Pango with a font of the system, and no browse
 from __future__ import annotations
 
 import base64
-import json
-import multiprocessing as mp
 import re
 from collections.abc import Mapping
 from datetime import date
 from importlib.metadata import version
-from multiprocessing.connection import Connection
 from typing import Any
 
 from service.errors import ConflictError, InputError
 from service.rendering.report.sections import Designed
-from service.workers.processes import start
+from service.workers.processes import EndedError, told_apart
 
 PAGE, PDF = "html", "pdf"
 FORMS = {PAGE: "text/html", PDF: "application/pdf"}
@@ -124,22 +121,16 @@ def report_apart(
     ConflictError
         It takes more time or memory than it may, or there is nothing to report; the message says what to do.
     """
-    ours, theirs = mp.Pipe(duplex=False)
-    with ours:
-        argument = {"scene": dict(scene), "problem": dict(problem), "result": dict(result),
-                    "about": dict(about), "form": form}  # fmt: skip
-        process = start(_main, (theirs, argument, seconds), "report")
-        theirs.close()
-        try:
-            if not ours.poll(seconds):
-                raise ConflictError(_beyond(f"longer than {seconds:g} s"))
-            answer = json.loads(ours.recv_bytes(_MOST_BYTES))
-        except (EOFError, OSError) as error:
-            raise ConflictError(_beyond("more memory or time than there is for it")) from error
-        finally:
-            process.kill()
-            process.join()
-            process.close()
+    argument = {"scene": dict(scene), "problem": dict(problem), "result": dict(result), "about": dict(about),
+                "form": form}  # fmt: skip
+    try:
+        answer = told_apart(
+            _answer, argument, "report", seconds=seconds, most_bytes=_MOST_BYTES, memory=MEMORY_BYTES
+        )
+    except TimeoutError as error:
+        raise ConflictError(_beyond(f"longer than {seconds:g} s")) from error
+    except (EndedError, OSError) as error:
+        raise ConflictError(_beyond("more memory or time than there is for it")) from error
     if "error" in answer:
         raise ConflictError(answer["error"])
     return base64.b64decode(answer["report"])
@@ -149,21 +140,7 @@ def _beyond(what: str) -> str:
     return f"making the report takes {what}: `stickslip report JOB` makes it on your machine"
 
 
-def _main(connection: Connection, argument: Mapping[str, Any], seconds: float) -> None:
-    """The life of the process."""
-    import contextlib
-
-    from service.uploads.inspection import limit_process
-
-    limit_process(seconds, MEMORY_BYTES)
-    # The other end may have lost its patience.
-    with contextlib.suppress(BrokenPipeError):
-        connection.send_bytes(json.dumps(_answer(argument)).encode())
-
-
 def _answer(given: Mapping[str, Any]) -> dict[str, str]:
-    from service.errors import InputError
-    from service.rendering.report.sections import Designed
     from solver.errors import SolverError
     from solver.scene.scene import Scene
 
