@@ -26,7 +26,7 @@ from service.db.clock import utc_now
 from service.db.engine import Database
 from service.db.models import Job, JobState
 from service.db.repositories.run_repository import Runs
-from service.schemas.pages import newest
+from service.schemas.answers import newest
 from service.schemas.workbench_answers import RunQuery
 from service.settings.settings import load_settings
 

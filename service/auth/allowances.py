@@ -23,10 +23,8 @@ class Buckets:
 
     Parameters
     ----------
-    most : int
-        Buckets kept at a time.
-    steady : callable
-        Seconds that never jump.
+    most : buckets kept at a time.
+    steady : seconds that never jump.
     """
 
     def __init__(self, most: int = _MOST_NAMES, steady: Callable[[], float] = time.monotonic) -> None:
@@ -90,10 +88,8 @@ class AtATime:
 
     Parameters
     ----------
-    words : str
-        What is counted.
-    most : int or None
-        Of all owners together.
+    words : what is counted.
+    most : of all owners together.
     """
 
     def __init__(self, words: str, most: int | None = None) -> None:
@@ -147,12 +143,9 @@ class Storage:
 
     Parameters
     ----------
-    repository : StorageRepository
-        Counts.
-    settings : Limits
-        The limit of keys that have none of their own.
-    steady : callable
-        Seconds that never jump.
+    repository : counts.
+    settings : the limit of keys that have none of their own.
+    steady : seconds that never jump.
     """
 
     def __init__(

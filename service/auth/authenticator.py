@@ -19,9 +19,8 @@ from service.auth.allowances import Buckets
 from service.auth.callers import KEYLESS, NO_LIMITS, Caller, KeyLimits, Scope, included
 from service.db.clock import Clock
 from service.db.models import NOBODY, ApiKey
-from service.db.repositories.owned import KEYS, KeyRepository
+from service.db.repositories.owned import KEYS, KeyRepository, Made, digest_of, matches
 from service.db.repositories.run_repository import NO_LINK, RunRow, Shares
-from service.db.tokens import Made, digest_of, matches
 from service.errors import (
     ForbiddenError,
     InvalidRequestError,
@@ -100,14 +99,10 @@ class Authenticator:
 
     Parameters
     ----------
-    keys, shares : KeyRepository, Shares
-        The keys, and the links to runs.
-    settings : Settings
-        Whether keys are needed, and how often they may be used or guessed.
-    now : callable
-        The clock that expiry is judged by.
-    steady : callable
-        Seconds that never jump.
+    keys, shares : the keys, and the links to runs.
+    settings : whether keys are needed, and how often they may be used or guessed.
+    now : the clock that expiry is judged by.
+    steady : seconds that never jump.
     """
 
     def __init__(

@@ -36,20 +36,14 @@ class KeyLimits(BaseModel):
 
     Attributes
     ----------
-    requests_per_minute : int or None
-        Requests in a minute.
-    waiting : int or None
-        Jobs that may wait at a time.
-    storage_bytes : int or None
-        What uploads and results may take [bytes].
-    requests, streams, previews, uploads : int or None
-        Requests answered, event streams, waiting previews and uploads at a time.
-    priority : int or None
-        The highest priority of a job.
-    seconds : float or None
-        Longest time one attempt at a job may take [s].
-    work : int or None
-        Largest job: points × harmonics × DOFs.
+    requests_per_minute : requests in a minute.
+    waiting : jobs that may wait at a time.
+    storage_bytes : what uploads and results may take [bytes].
+    requests, streams, previews, uploads : requests answered, event streams, waiting previews and uploads at a
+        time.
+    priority : the highest priority of a job.
+    seconds : longest time one attempt at a job may take [s].
+    work : largest job: points × harmonics × DOFs.
     """
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)

@@ -25,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     gc.set_threshold(_NEW_OBJECTS, *before[1:])
     try:
         # Worker processes import the main module anew: only the command itself needs what follows.
-        from service.cli.app import run
+        from service.cli.table import run
 
         return run(arguments)
     finally:

@@ -13,7 +13,7 @@ from typer.core import TyperGroup
 
 from service.cli.failures import end, refused
 from service.cli.options import inputs
-from service.cli.options import shared as options
+from service.cli.options import parameters as options
 from service.cli.options.inputs import output_path
 from service.cli.options.key_options import KeyOption, key_options
 from service.cli.options.parameters import keyword, with_parameters

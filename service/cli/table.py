@@ -5,6 +5,8 @@ They are imported when they are called: `stickslip --help` reads the table, and 
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,6 +17,8 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from service.cli.failures import REPORTED, report
+from service.cli.options.inputs import join_words
 from service.jobs.names import home_of
 from solver.lab import LAB, is_there
 from solver.results.views import on_demand
@@ -164,16 +168,16 @@ DATABASE = (
 )  # fmt: skip
 
 KEYS = (
-    CommandEntry("create", "commands.key_commands.create", "Make a key and print it, this once."),
+    CommandEntry("create", "commands.service.create", "Make a key and print it, this once."),
     CommandEntry(
-        "list", "commands.key_commands.show",
+        "list", "commands.service.show",
         "List the keys, also those that work no more. What opens the door is not kept, and not shown.",
     ),
     CommandEntry(
-        "rotate", "commands.key_commands.rotate",
+        "rotate", "commands.service.rotate",
         "Give a key another secret and print it, this once; the old one ends within a second.",
     ),
-    CommandEntry("revoke", "commands.key_commands.revoke", "End a key, within a second in every service."),
+    CommandEntry("revoke", "commands.service.revoke", "End a key, within a second in every service."),
 )  # fmt: skip
 
 RUNS = (
@@ -301,3 +305,62 @@ COMMANDS = {
 }  # fmt: skip
 
 TOP = {entry.name: entry for entries in COMMANDS.values() for entry in entries}
+
+
+_app = typer.Typer(
+    cls=LazyGroup,
+    name="stickslip",
+    help="Design friction dampers: periodic responses, continuation, and the best normal load.",
+    rich_markup_mode=None,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(version("stickslip"))
+        raise typer.Exit
+
+
+@_app.callback()
+def _root(
+    _version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None: ...
+
+
+def command(asked: str = "") -> LazyGroup:
+    """Return `stickslip` with every command under it, each imported when it is used.
+
+    Parameters
+    ----------
+    asked : the command that is used: what is no command of the package may be a study of another one.
+    """
+    root = typer.main.get_command(_app)
+    if not isinstance(root, LazyGroup):
+        raise TypeError(f"typer made {type(root).__name__} of the application")
+    for heading, entries in COMMANDS.items():
+        root.add(heading, entries)
+    if os.environ.get("STICKSLIP_KINDS") and asked not in root.commands:
+        from service.cli.study_command import add_others
+
+        add_others(root)
+    return root
+
+
+def run(arguments: Sequence[str] | None) -> int:
+    """Run the command and return its exit status."""
+    given = sys.argv[1:] if arguments is None else arguments
+    # The commands have bars of their own, and what a service computes is watched elsewhere.
+    os.environ.setdefault("STICKSLIP_PROGRESS", "0")
+    try:
+        command(given[0] if given else "")(args=join_words(given), prog_name="stickslip")
+    except REPORTED as error:
+        return report(error)
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else 0
+    return 0

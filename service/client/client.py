@@ -7,13 +7,13 @@ import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal
 
 import httpx
 import numpy as np
 from numpy.typing import NDArray
 
-from service.client.transport import Transport, pauses, segment, words
+from service.client.transport import pauses, segment, words
 from service.client.workbench import Workbench
 from service.errors import ServiceProblem
 from service.schemas.answers import (
@@ -30,6 +30,8 @@ from service.schemas.answers import (
     JobScene,
     KindAnswer,
     KindList,
+    LawAnswer,
+    LawList,
     ResultPage,
     ResultsAnswer,
     SceneAnswer,
@@ -41,7 +43,6 @@ from service.schemas.answers import (
     SweepPage,
     told,
 )
-from service.schemas.law_answers import LawAnswer, LawList
 from service.schemas.matrix_answers import (
     FormatAnswer,
     FormatsAnswer,
@@ -77,20 +78,6 @@ class Client(Workbench):
     key : str, optional
         A key to the service, where it needs one.
     """
-
-    def __init__(self, base_url: str, timeout: float = 30.0, *, key: str | None = None) -> None:
-        self.base_url, self._timeout = base_url, timeout
-        self._transport = Transport(base_url, timeout, key)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the connections."""
-        self._transport.close()
 
     def submit(
         self, body: Mapping[str, Any], *, idempotency_key: str | None = None, wait: float | None = None
@@ -144,7 +131,7 @@ class Client(Workbench):
             headers: dict[str, str] = {} if last is None else {"Last-Event-ID": last}
             broken: Exception = ConnectionError("the stream ended before the job")
             try:
-                with self._transport.stream(path, headers, silence) as answer:
+                with self._stream(path, headers, silence) as answer:
                     for event in told(answer.iter_lines()):
                         tries = pauses()
                         last = event.id or last
@@ -156,7 +143,7 @@ class Client(Workbench):
                 broken = error
             pause = next(tries)
             if pause is None:
-                raise self._transport.away(broken) from broken
+                raise self._away(broken) from broken
             time.sleep(pause)
 
     def wait(
@@ -226,7 +213,7 @@ class Client(Workbench):
     def job_report(self, job_id: str, form: Literal["html", "pdf"] = "pdf") -> bytes:
         """The design report of a job, made by the service: a page or a PDF."""
         path = f"/v1/jobs/{segment(job_id)}/report"
-        return self._transport.send("GET", path, params={"format": form}).content
+        return self._send("GET", path, params={"format": form}).content
 
     def job_scene(self, job_id: str) -> dict[str, Any]:
         """The scene of a job as it is computed, with its values set and what its uploads held."""
@@ -259,7 +246,7 @@ class Client(Workbench):
 
     def sweep_plot(self, sweep_id: str, form: Literal["svg", "png"] = "svg") -> bytes:
         """A picture of a stored sweep."""
-        return self._transport.send("GET", f"/v1/sweeps/{segment(sweep_id)}/plot.{form}").content
+        return self._send("GET", f"/v1/sweeps/{segment(sweep_id)}/plot.{form}").content
 
     def stored(self, of: str, **filters: Any) -> Iterator[StoredResult]:
         """Every stored result of a kind that meets the filters of ``GET /v1/results``, page after page."""
@@ -307,12 +294,12 @@ class Client(Workbench):
 
     def scenes_schema(self) -> dict[str, Any]:
         """The JSON Schema of scenes, ``GET /v1/scenes-schema``."""
-        answer: dict[str, Any] = self._transport.json("GET", "/v1/scenes-schema")
+        answer: dict[str, Any] = self._send("GET", "/v1/scenes-schema").json()
         return answer
 
     def templates(self) -> list[dict[str, Any]]:
         """The common cases that scenes begin with, each with its questions: ``GET /v1/templates``."""
-        items: list[dict[str, Any]] = self._transport.json("GET", "/v1/templates")["items"]
+        items: list[dict[str, Any]] = self._send("GET", "/v1/templates").json()["items"]
         return items
 
     def scene_from(self, template: str, answers: Mapping[str, Any]) -> dict[str, Any]:
@@ -327,7 +314,7 @@ class Client(Workbench):
 
     def scene_text(self, body: Mapping[str, Any]) -> str:
         """A scene with its values set, as TOML: the body of ``POST /v1/scenes/text``."""
-        return self._transport.send("POST", "/v1/scenes/text", json=dict(body)).text
+        return self._send("POST", "/v1/scenes/text", json=dict(body)).text
 
     def upload(self, file: Path | bytes, name: str | None = None, format: str | None = None) -> NewUpload:
         """Upload a file of matrices or modes, given by its path or its bytes; a large one in parts.
@@ -362,7 +349,7 @@ class Client(Workbench):
 
     def delete_upload(self, upload_id: str) -> None:
         """Forget an upload."""
-        self._transport.send("DELETE", f"/v1/uploads/{segment(upload_id)}")
+        self._send("DELETE", f"/v1/uploads/{segment(upload_id)}")
 
     def formats(self) -> list[FormatAnswer]:
         """The formats of files that can be uploaded."""
@@ -377,7 +364,7 @@ class Client(Workbench):
         from service.queue.health import Health, Readiness
 
         try:
-            answer = self._transport.send("GET", "/health/ready").json()
+            answer = self._send("GET", "/health/ready").json()
         except ServiceProblem as problem:
             if problem.status != 503 or "ready" not in problem.problem:
                 raise
@@ -386,7 +373,7 @@ class Client(Workbench):
 
     def metrics(self) -> str:
         """What a monitor reads, in Prometheus' text format."""
-        return self._transport.send("GET", "/metrics").text
+        return self._send("GET", "/metrics").text
 
     def _submit(self, path: str, body: Mapping[str, Any], key: str | None, wait: float | None) -> JobAnswer:
         headers = {"Idempotency-Key": key or str(uuid.uuid4())}
@@ -394,10 +381,10 @@ class Client(Workbench):
         if wait is not None:
             headers["Prefer"] = f"wait={max(round(wait), 0)}"
             timeout += wait
-        answer = self._transport.send("POST", path, json=dict(body), headers=headers, timeout=timeout)
+        answer = self._send("POST", path, json=dict(body), headers=headers, timeout=timeout)
         model = FinishedJob if answer.status_code == httpx.codes.OK else JobAnswer
         return model.model_validate(answer.json())
 
     def _sweep_as(self, sweep_id: str, media: str) -> bytes:
         headers = {"Accept": media}
-        return self._transport.send("GET", f"/v1/sweeps/{segment(sweep_id)}", headers=headers).content
+        return self._send("GET", f"/v1/sweeps/{segment(sweep_id)}", headers=headers).content

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any, TypeVar
+from collections.abc import Iterator
+from typing import Any
 
-from pydantic import BaseModel
-
-from service.client.transport import Transport, segment, words
+from service.client.transport import Transport, segment
 from service.schemas.answers import JobScene, ResultsAnswer, SweepDetail
 from service.schemas.workbench_answers import (
     Comparison,
@@ -23,40 +21,8 @@ from service.schemas.workbench_answers import (
     SharePage,
 )
 
-ModelT = TypeVar("ModelT", bound=BaseModel)
 
-
-class Requests:
-    """What all methods of a client go through."""
-
-    _transport: Transport
-
-    def _get(self, model: type[ModelT], path: str, **query: Any) -> ModelT:
-        return model.model_validate(self._transport.json("GET", path, params=words(query) or None))
-
-    def _sent(self, model: type[ModelT], method: str, path: str, **arguments: Any) -> ModelT:
-        return model.model_validate(self._transport.json(method, path, **arguments))
-
-    def _posted(self, path: str, body: Mapping[str, Any]) -> dict[str, Any]:
-        answer: dict[str, Any] = self._transport.json("POST", path, json=dict(body))
-        return answer
-
-    def _changed(
-        self, model: type[ModelT], path: str, revision: int | None, changes: Mapping[str, Any]
-    ) -> ModelT:
-        headers = {} if revision is None else {"If-Match": f'"{revision}"'}
-        return self._sent(model, "PATCH", path, json=changes, headers=headers)
-
-    def _pages(self, model: type[Any], path: str, filters: Mapping[str, Any]) -> Iterator[Any]:
-        """The items of a list, page after page."""
-        page = model.model_validate(self._transport.json("GET", path, params=words(filters)))
-        yield from page.items
-        while page.next is not None:
-            page = model.model_validate(self._transport.json("GET", page.next))
-            yield from page.items
-
-
-class Workbench(Requests):
+class Workbench(Transport):
     """Projects, runs and links to them.
 
     Where a `revision` is given, a change is refused (`ServiceProblem` with status 412) if what is changed has
@@ -135,7 +101,7 @@ class Workbench(Requests):
 
     def end_share(self, run_id: str, share_id: str) -> None:
         """End a link to a run."""
-        self._transport.send("DELETE", f"{_run(run_id)}/shares/{segment(share_id)}")
+        self._send("DELETE", f"{_run(run_id)}/shares/{segment(share_id)}")
 
     def shared_run(self, token: str) -> SharedRun:
         """The run of a link."""

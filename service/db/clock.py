@@ -25,10 +25,8 @@ class SharedClock:
 
     Parameters
     ----------
-    read : callable
-        The time of the server.
-    steady : callable
-        Seconds that never jump.
+    read : the time of the server.
+    steady : seconds that never jump.
     """
 
     def __init__(self, read: Clock, steady: Callable[[], float] = time.monotonic) -> None:

@@ -14,12 +14,12 @@ import shutil
 import sqlite3
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from sqlalchemy import Connection, Engine, create_engine, event, func, select, text
 from sqlalchemy.engine import make_url
@@ -28,11 +28,43 @@ from sqlalchemy.exc import DBAPIError, IntegrityError
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool
 
 from service.db import postgresql
-from service.db.arrays_outside import array_store
 from service.db.clock import utc_now
 from service.db.lock import FileLock, make_private
 from service.errors import DatabaseError
 from service.jobs import strict_json
+from service.jobs.stored_figures import StoredArray
+from solver.lab import from_lab
+
+
+class ArrayStore(Protocol):
+    """Arrays in one folder of one store, whose place is as it was given."""
+
+    place: str
+
+    def put(self, job_id: str, array: StoredArray) -> StoredArray:
+        """Write an array of a job, unless it is small; what its row is to hold."""
+
+    def get(self, job_id: str, sha256: str) -> bytes:
+        """Read an array; DatabaseError if it is not there or cannot be read."""
+
+    def keep(self, job_id: str, digests: Collection[str]) -> None:
+        """Delete all arrays of a job but these."""
+
+    def jobs(self) -> Iterator[str]:
+        """Yield the jobs that have files here."""
+
+
+def array_store(place: str | None) -> ArrayStore | None:
+    """Return the store at a folder or a URL of fsspec; None for none.
+
+    Raises
+    ------
+    ConfigurationError
+        It cannot be used.
+    """
+    made: ArrayStore | None = None if place is None else from_lab("stores.array_store:FsspecStore")(place)
+    return made
+
 
 BUSY_TIMEOUT_SECONDS = 30.0
 SQLITE_WITHOUT_WAL_BUG = (3, 51, 3)
@@ -200,14 +232,10 @@ class Database:
 
     Parameters
     ----------
-    url : str
-        An SQLite or PostgreSQL URL.
-    connections : int
-        Most connections to PostgreSQL at a time.
-    seconds : float
-        Longest time for a statement, for a lock, for a connection [s].
-    arrays : str or None
-        Where large arrays are, if that is outside of the database (see `service.db.arrays_outside`).
+    url : an SQLite or PostgreSQL URL.
+    connections : most connections to PostgreSQL at a time.
+    seconds : longest time for a statement, for a lock, for a connection [s].
+    arrays : where large arrays are, if that is outside of the database (see `service.db.engine`).
     """
 
     def __init__(

@@ -31,12 +31,9 @@ class Notices:
 
     Parameters
     ----------
-    connect : callable
-        Opens a connection of psycopg that commits by itself.
-    accepted : callable
-        Called when a job waits that another service accepted, and when notices may have been missed.
-    hear : mapping
-        What is called with the text of a notice of another service, by its word.
+    connect : opens a connection of psycopg that commits by itself.
+    accepted : called when a job waits that another service accepted, and when notices may have been missed.
+    hear : what is called with the text of a notice of another service, by its word.
     """
 
     def __init__(

@@ -165,12 +165,9 @@ def service_engine(url: str, connections: int, seconds: float) -> Engine:
 
     Parameters
     ----------
-    url : str
-        A PostgreSQL URL.
-    connections : int
-        Most connections at a time; further threads wait for one.
-    seconds : float
-        Longest time for a statement, and to wait for a connection [s].
+    url : a PostgreSQL URL.
+    connections : most connections at a time; further threads wait for one.
+    seconds : longest time for a statement, and to wait for a connection [s].
     """
     patience = max(_LEAST_CONNECT_SECONDS, math.ceil(seconds))
     engine = _create(

@@ -39,10 +39,8 @@ class UploadFiles:
 
     Parameters
     ----------
-    url : str
-        The database.
-    reading, writing : callable
-        Begin a transaction.
+    url : the database.
+    reading, writing : begin a transaction.
     """
 
     def __init__(

@@ -17,12 +17,11 @@ from service.auth.authenticator import Authenticator
 from service.errors import ConfigurationError
 from service.http import metrics, openapi
 from service.http.dependencies import BodyTurns, HostCheck
-from service.http.large_answers import InPieces, LargeAnswers
+from service.http.made_once import InPieces, LargeAnswers, Reports
 from service.http.metrics import Metrics, RequestMetrics
 from service.http.middleware.admission import Admission, ConcurrencyLimits, by_link
 from service.http.middleware.connections import Connections
 from service.http.middleware.every_answer import HeadAsGet, HeadersAndAudit, RequestLog
-from service.http.reports import Reports
 from service.http.routes import events, page, run_list, stored
 from service.http.routes import form_routes as forms
 from service.http.routes import job_routes as jobs

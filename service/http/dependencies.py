@@ -33,7 +33,7 @@ from service.errors import (
     SlowBodyError,
     UnsupportedMediaError,
 )
-from service.http.constant import known_by
+from service.http.made_once import known_by
 from service.jobs import strict_json
 from service.jobs.strict_json import MOST_TOLD, issues_of
 from service.queue.core import Service

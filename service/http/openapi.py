@@ -10,7 +10,7 @@ from fastapi import APIRouter, FastAPI, Request, Response
 from pydantic import BaseModel
 
 from service import errors
-from service.http.constant import Constant
+from service.http.made_once import Constant
 from service.http.middleware.admission import OPEN
 from service.http.routes.form_routes import constants
 from service.http.routes.page import reference
@@ -253,8 +253,7 @@ def describe(description: dict[str, Any], problem: dict[str, Any]) -> None:
 
     Parameters
     ----------
-    problem : dict
-        The schema of a problem document.
+    problem : the schema of a problem document.
     """
     components = description["components"]
     components["schemas"]["Problem"] = problem

@@ -94,8 +94,7 @@ def work(settings: Settings, registry: Registry | None = None, *, until_empty: b
 
     Parameters
     ----------
-    until_empty : bool
-        End when no job waits or runs.
+    until_empty : end when no job waits or runs.
 
     `Service.open` lists the errors.
     """

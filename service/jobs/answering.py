@@ -22,8 +22,7 @@ from service.jobs.common.scene_requests import (
 )
 from service.jobs.common.scene_text import issues_of_scene, read_text, side_by_side
 from service.jobs.common.sizes import memory_limited, work_limited
-from service.jobs.kind_registry import JobRequest, Registry, Resolve, RunOn, SceneSource
-from service.jobs.kinds.bodies import KIND as KIND
+from service.jobs.kind_registry import KIND, JobRequest, Registry, Resolve, RunOn, SceneSource, request_in
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.strict_json import JsonText, digest, encoded
 from service.jobs.studies.plan_study import Plan
@@ -87,21 +86,14 @@ class Prepared:
 
 
 def prepared(
-    kind: str,
-    resolve: Resolve,
-    request: JobRequest,
-    body: Words,
-    source: SceneSource,
-    *,
-    work: int | None,
-    memory: int | None,
-    version: str,
-) -> Prepared:
-    """Resolve a request.
+    resolve: Resolve, request: JobRequest, body: Words, source: SceneSource, *,
+    work: int | None, memory: int | None, version: str,
+) -> Prepared:  # fmt: skip
+    """Resolve a request for a job.
 
     Parameters
     ----------
-    body : as it came, with its kind.
+    request, body : what is asked of the kind, and as it came, with its kind.
     work : limit of the caller's key.
     memory : most that the dense matrices may take [bytes].
     version : of the solver, on which results depend.
@@ -115,7 +107,7 @@ def prepared(
         found = resolve(request, source)
     return Prepared(
         spec=encoded(found.spec),
-        spec_hash=digest({"kind": kind, "spec": found.spec, "version": version}),
+        spec_hash=digest({"kind": body[KIND], "spec": found.spec, "version": version}),
         request_hash=digest(body),
         scene_name=found.scene_name,
         scene_hash=found.scene_hash,
@@ -126,19 +118,15 @@ def prepared(
 class _Resolving:
     """The task that resolves requests of some kinds; sent to the processes by the names of its parts."""
 
-    kinds: Mapping[str, Resolve]
+    kinds: Mapping[str, tuple[type[JobRequest], Resolve]]
 
     @classmethod
     def of(cls, registry: Registry) -> _Resolving:
-        return cls({kind.name: kind.resolve for kind in registry})
+        return cls({kind.name: (kind.request, kind.resolve) for kind in registry})
 
     def __call__(self, words: Words, source: SceneSource) -> dict[str, Any]:
-        name = words[KIND]
-        found = prepared(
-            name, self.kinds[name], words["request"], words["body"], source,
-            work=words["work"], memory=words["memory"], version=words["version"],
-        )  # fmt: skip
-        return asdict(found)
+        model, resolve = self.kinds[words["body"][KIND]]
+        return asdict(prepared(resolve, request_in(words["body"], model), source=source, **words))
 
 
 def _plan(words: Words, source: SceneSource) -> dict[str, Any]:

@@ -88,16 +88,11 @@ class Checkpoints:
 
     Parameters
     ----------
-    job_id : str
-        Of the job, for the log.
-    found : sequence of Piece
-        What earlier attempts kept.
-    send : callable
-        Takes what is to be stored.
-    pace : Pace
-        How often pieces are sent, and how much a job may keep.
-    request : str
-        Digest of what is computed; pieces of another one are not used.
+    job_id : of the job, for the log.
+    found : what earlier attempts kept.
+    send : takes what is to be stored.
+    pace : how often pieces are sent, and how much a job may keep.
+    request : digest of what is computed; pieces of another one are not used.
     """
 
     def __init__(

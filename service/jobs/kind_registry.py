@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Protocol
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from service.errors import InvalidRequestError
+from service.jobs.strict_json import validated
 from solver.errors import Shown
 from solver.results.told import Block, Summary
 
@@ -204,6 +205,7 @@ class Flag(NamedTuple):
     words: tuple[str, ...] = ()
 
 
+KIND = "kind"
 ABOUT_THE_RUN = ("project", "name", "notes", "tags")
 ABOUT_THE_JOB = ("fresh", "priority", "max_seconds", *ABOUT_THE_RUN)
 
@@ -302,6 +304,11 @@ class JobKind:
             )
 
 
+def request_in(body: Mapping[str, Any], model: type[JobRequest]) -> JobRequest:
+    """What a body asks of a kind (InvalidRequestError lists what is wrong)."""
+    return validated(model, {key: value for key, value in body.items() if key != KIND})
+
+
 def no_warm_up() -> None:
     """For kinds that need none."""
 
@@ -333,19 +340,22 @@ class Registry:
     def __contains__(self, name: object) -> bool:
         return name in self._kinds
 
-    def get(self, name: object) -> JobKind:
-        """The kind of this name.
+    def parse(self, body: Mapping[str, Any]) -> tuple[JobKind, JobRequest]:
+        """The kind that a body names, and what it asks of it.
 
         Raises
         ------
         InvalidRequestError
-            If there is none, listing those there are.
+            Lists everything that is wrong.
         """
-        if isinstance(name, str) and name in self._kinds:
-            return self._kinds[name]
-        raise InvalidRequestError.of(
-            ("kind",), f"must be one of {', '.join(self._kinds)}", Shown(f"{name!r:.80}")
-        )
+        if KIND not in body:
+            raise InvalidRequestError.of((KIND,), "is missing")
+        name = body[KIND]
+        if not isinstance(name, str) or name not in self._kinds:
+            known = ", ".join(self._kinds)
+            raise InvalidRequestError.of((KIND,), f"must be one of {known}", Shown(f"{name!r:.80}"))
+        kind = self._kinds[name]
+        return kind, request_in(body, kind.request)
 
     def tell_of(self, name: str) -> Tell | None:
         """What puts results of a kind in words, if there is such a kind and it says it."""

@@ -77,16 +77,11 @@ class Pace:
 
     Attributes
     ----------
-    progress_seconds : float
-        Least time between two reports of an attempt [s].
-    checkpoint_seconds : float
-        Least time between two checkpoints of an attempt [s].
-    checkpoint_bytes : int
-        Most that a job keeps for later attempts.
-    log_level, log_format : str
-        As in `service.settings.logs.configure`.
-    traces : bool
-        As in `service.settings.traces.configure`.
+    progress_seconds : least time between two reports of an attempt [s].
+    checkpoint_seconds : least time between two checkpoints of an attempt [s].
+    checkpoint_bytes : most that a job keeps for later attempts.
+    log_level, log_format : as in `service.settings.logs.configure`.
+    traces : as in `service.settings.traces.configure`.
     """
 
     progress_seconds: float

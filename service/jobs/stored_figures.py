@@ -123,8 +123,7 @@ class StoredRecord:
 
     Attributes
     ----------
-    of : str
-        What is stored: a sweep, a design, or the kind of the job.
+    of : what is stored: a sweep, a design, or the kind of the job.
     number, id, job_id, position, owner, created
         Where it is stored, and whose; given there.
     """

@@ -30,22 +30,18 @@ from service.db.repositories import (
     UploadRepository,
 )
 from service.db.repositories.owned import KeyRepository, Projects, StorageRepository, visible
-from service.db.repositories.run_repository import Runs, Shares
-from service.db.repositories.stored_rows import RunWords
+from service.db.repositories.run_repository import Runs, RunWords, Shares
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
 from service.jobs import answering
 from service.jobs.answering import Prepared, prepared
-from service.jobs.kind_registry import ABOUT_THE_RUN, JobKind, JobRequest, Registry
-from service.jobs.kinds.bodies import KIND
+from service.jobs.kind_registry import ABOUT_THE_RUN, JobRequest, Registry
 from service.jobs.outputs import OnProgress
 from service.jobs.stored_figures import DESIGN, SWEEP, DesignRecord, SweepRecord
-from service.jobs.strict_json import validated
-from service.queue.elsewhere import Elsewhere
 from service.queue.lanes import Lanes
 from service.queue.meters import Meters
 from service.queue.queue import JobQueue
 from service.queue.retention import Retention
-from service.queue.running import Event, Live, Waiters
+from service.queue.running import Elsewhere, Event, Live, Waiters
 from service.queue.scene_store import SceneStore
 from service.settings import traces
 from service.settings.kinds import registry_of
@@ -93,12 +89,9 @@ class Service:
 
     Parameters
     ----------
-    settings : Settings
-        Its settings.
-    registry : Registry, optional
-        The kinds of job it runs; those shipped and those of the setting `kinds` if not given.
-    now : callable, optional
-        Its clock (see `JobRepository`).
+    settings : its settings.
+    registry : the kinds of job it runs; those shipped and those of the setting `kinds` if not given.
+    now : its clock (see `JobRepository`).
     """
 
     def __init__(
@@ -214,9 +207,17 @@ class Service:
         self.waiters.wake_all()
 
     def submit(
-        self, body: Mapping[str, Any], idempotency_key: str | None = None, caller: Caller = KEYLESS
+        self,
+        body: Mapping[str, Any],
+        idempotency_key: str | None = None,
+        caller: Caller = KEYLESS,
+        found: Prepared | None = None,
     ) -> tuple[JobRow, bool]:
         """Accept a job of the caller's; whether it is new, and not made before under its idempotency key.
+
+        Parameters
+        ----------
+        found : what the body was resolved to, beside this process if it is a stranger's.
 
         Raises
         ------
@@ -225,36 +226,16 @@ class Service:
         IdempotencyError, QueueFullError, TooManyRequestsError
             See `JobRepository.submit`.
         """
-        if KIND not in body:
-            raise InvalidRequestError.of(("kind",), "is missing")
-        kind = self.registry.get(body[KIND])
-        request = validated(kind.request, {key: value for key, value in body.items() if key != KIND})
-        return self.accept(kind, request, body, idempotency_key, caller)
-
-    def accept(
-        self,
-        kind: JobKind,
-        request: JobRequest,
-        body: Mapping[str, Any],
-        idempotency_key: str | None = None,
-        caller: Caller = KEYLESS,
-        found: Prepared | None = None,
-    ) -> tuple[JobRow, bool]:
-        """As `submit`, of a body that was checked: `request` is what it says, without its kind.
-
-        Parameters
-        ----------
-        found : what the request was resolved to, beside this process if it is a stranger's.
-        """
+        kind, request = self.registry.parse(body)
         seconds = self._seconds_limit(request, caller)
         self._require_priority(request, caller)
         self.storage.require(caller)
         if found is None:
+            memory, work = self.settings.worker_memory_bytes or None, caller.limits.work
+            source = self.scenes.of(caller)
             found = prepared(
-                kind.name, kind.resolve, request, body, self.scenes.of(caller),
-                work=caller.limits.work, memory=self.settings.worker_memory_bytes or None,
-                version=SOLVER_VERSION,
-            )  # fmt: skip
+                kind.resolve, request, body, source, work=work, memory=memory, version=SOLVER_VERSION
+            )
         new = NewJob(
             kind=kind.name,
             request=dict(body),

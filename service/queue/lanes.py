@@ -42,12 +42,9 @@ class Lane:
 
     Parameters
     ----------
-    threads : int
-        How many calls run at a time.
-    seconds : float
-        How long a call waits for its turn at most [s].
-    waited : callable, optional
-        Told how long each call waited [s].
+    threads : how many calls run at a time.
+    seconds : how long a call waits for its turn at most [s].
+    waited : told how long each call waited [s].
     """
 
     def __init__(self, threads: int, seconds: float, waited: Callable[[float], object] = _unwatched) -> None:

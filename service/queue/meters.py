@@ -56,10 +56,9 @@ class Refusals(Collector):
 
     Parameters
     ----------
-    shown : int
-        How many owners have a series of their own.
-    ranked : int
-        How many owners are compared; beyond it all ranks are halved, and who was refused once is forgotten.
+    shown : how many owners have a series of their own.
+    ranked : how many owners are compared; beyond it all ranks are halved, and who was refused once is
+        forgotten.
     """
 
     def __init__(self, shown: int = _SHOWN, ranked: int = _RANKED) -> None:

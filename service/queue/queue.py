@@ -51,16 +51,11 @@ class JobQueue:
 
     Parameters
     ----------
-    jobs : JobRepository
-        Where the jobs are.
-    executor : Executor
-        What runs them.
-    settings : Settings
-        Lease, poll and time limit.
-    waiters : Waiters
-        Told of progress and of every job that ends.
-    meters : Meters
-        Told how long jobs wait and run.
+    jobs : where the jobs are.
+    executor : what runs them.
+    settings : lease, poll and time limit.
+    waiters : told of progress and of every job that ends.
+    meters : told how long jobs wait and run.
     """
 
     def __init__(

@@ -145,13 +145,10 @@ class Retention:
 
     Parameters
     ----------
-    database : Database
-        Where the jobs are.
-    settings : Settings
-        `retention_days`, `retention_keep_designs` and `retention_upload_days`, without which no jobs and
-        uploads are deleted but those in the bin; `bin_days`.
-    now : callable
-        The clock of the database.
+    database : where the jobs are.
+    settings : `retention_days`, `retention_keep_designs` and `retention_upload_days`, without which no jobs
+        and uploads are deleted but those in the bin; `bin_days`.
+    now : the clock of the database.
     """
 
     def __init__(self, database: Database, settings: Settings, now: Callable[[], datetime]) -> None:

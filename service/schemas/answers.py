@@ -1,21 +1,26 @@
-"""What the service answers, over HTTP and embedded alike, and what the events of a job say."""
+"""What the service answers, over HTTP and embedded alike: lists and how they are asked for, events, laws."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from datetime import datetime
-from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
+from service.db import pagination
 from service.db.models import JobState, StoredScene
+from service.db.pagination import Position
 from service.db.repositories import JobRow, ResultRepository
 from service.jobs.outputs import AttemptProgress
 from service.jobs.stored_figures import DESIGN, SWEEP, DesignRecord, Quantity, StoredRecord, SweepRecord
+from service.settings.settings import Settings
+from solver.contacts.laws.law_registry import DEFAULT, laws
+from solver.scene.json_schema import scene_schema
 
 if TYPE_CHECKING:
     from service.queue.core import Results, WholeDesign
@@ -436,3 +441,127 @@ def _read(fields: dict[str, str]) -> Told:
         return Told(None, fields.get("id"))
     data: Any = json.loads(fields["data"])
     return Told(model.model_validate(data), fields.get("id"))
+
+
+Limit = Annotated[int, Field(ge=1, le=10_000)]
+Cursor = Annotated[str | None, Field(max_length=500)]
+
+
+class AskedModel(BaseModel):
+    """Root of what is asked: no other keys, no number that is not finite."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+class ListQuery(AskedModel):
+    """What to list; the fields stand in the queries themselves, in the order of the reference."""
+
+    path: ClassVar[str]
+    """Of the list."""
+
+    if TYPE_CHECKING:  # fields of every query, each where its list has them
+        limit: int
+        cursor: str | None
+
+
+class Numbered(Protocol):
+    """A row with an id; ids sort by time."""
+
+    @property
+    def id(self) -> Any:
+        """Its id, a str."""
+
+
+RowT = TypeVar("RowT")
+NumberedT = TypeVar("NumberedT", bound=Numbered)
+
+
+def page_of(
+    query: ListQuery,
+    settings: Settings,
+    read: Callable[[int, Position | None], Sequence[RowT]],
+    position: Callable[[RowT], Position],
+) -> tuple[Sequence[RowT], str | None]:
+    """The rows of a page and the link to the next one, None on the last.
+
+    Parameters
+    ----------
+    read : finds so many rows at most, those behind a position if there is one.
+    position : where a page that ends with a row goes on.
+
+    Raises
+    ------
+    InvalidRequestError
+        If the cursor is not one of this service.
+    """
+    limit = min(query.limit, settings.page_limit)
+    rows = read(limit + 1, None if query.cursor is None else pagination.decode(query.cursor))
+    if len(rows) <= limit:
+        return rows, None
+    return rows[:limit], pagination.next_link(query.path, query, *position(rows[limit - 1]))
+
+
+def newest(
+    query: ListQuery, settings: Settings, read: Callable[[int, str | None], Sequence[NumberedT]]
+) -> tuple[Sequence[NumberedT], str | None]:
+    """As `page_of`, newest first: `read` finds rows older than the one of an id, if there is one."""
+    return page_of(
+        query, settings, lambda most, after: read(most, after and after[1]), lambda row: (None, row.id)
+    )
+
+
+class SpanAnswer(AnswerModel):
+    """What a slider of a parameter covers."""
+
+    low: float
+    high: float
+    of: str | None = Field(
+        description="The parameter of whose absolute value both ends are multiples; null: they are values."
+    )
+    logarithmic: bool
+
+
+class LawParameter(AnswerModel):
+    """A parameter of a contact law: `CONTACT.name` is its path in a scene."""
+
+    name: str
+    symbol: str
+    unit: str = Field(description="Empty of a pure number.")
+    words: str
+    otherwise: list[str] | None = Field(
+        description="The parameters whose product it is where a scene leaves it out; null: it is not there."
+    )
+    slider: SpanAnswer | None
+
+
+class LawAnswer(AnswerModel):
+    """A contact law."""
+
+    name: str
+    default: bool = Field(description="Whether a contact that names no law has this one.")
+    parameters: list[LawParameter]
+
+
+class LawList(AnswerModel):
+    """All contact laws."""
+
+    items: list[LawAnswer]
+
+
+def law_list() -> LawList:
+    """Return every law of this process, with what the schema of scenes says of its parameters."""
+    defined = scene_schema()["$defs"]
+    items = []
+    for word, law in laws().items():
+        keys = defined[law.__name__]["properties"]
+        parameters = [
+            LawParameter(
+                name=key, symbol=quantity.symbol or key, unit=quantity.unit,
+                words=keys[key].get("description", ""),
+                otherwise=None if quantity.otherwise is None else list(quantity.otherwise),
+                slider=None if (span := quantity.span(key)) is None else SpanAnswer(**asdict(span)),
+            )
+            for key, quantity in law.PARAMETERS.items()
+        ]  # fmt: skip
+        items.append(LawAnswer(name=word, default=word == DEFAULT, parameters=parameters))
+    return LawList(items=items)

@@ -33,15 +33,18 @@ from service.jobs.stored_figures import (
 )
 from service.jobs.strict_json import validated
 from service.schemas.answers import (
+    Cursor,
     DesignAnswer,
     DesignPage,
+    Limit,
+    ListQuery,
     QuantityAnswer,
     ResultPage,
     StoredResult,
     SweepAnswer,
     SweepPage,
+    page_of,
 )
-from service.schemas.pages import Cursor, Limit, ListQuery, page_of
 from service.settings.settings import Settings
 from solver.errors import Issue
 from solver.wording import nearest

@@ -12,8 +12,7 @@ from service.db.models import JobState, Project, Share
 from service.db.repositories.run_repository import RunFilter, RunRow
 from service.jobs.kind_registry import LONGEST_TAG, MOST_TAGS, Notes, ProjectName, RunName, Tags
 from service.jobs.outputs import AttemptProgress
-from service.schemas.answers import AnswerModel, JobAnswer, Page, Peak
-from service.schemas.pages import AskedModel, Cursor, Limit, ListQuery
+from service.schemas.answers import AnswerModel, AskedModel, Cursor, JobAnswer, Limit, ListQuery, Page, Peak
 
 _REVISION = "Counts the changes; the `ETag`, for `If-Match` of a change."
 _DELETED = "When it was put in the bin; null outside of it."

@@ -24,11 +24,9 @@ def registry_of(entries: Iterable[str], base: Registry = SHIPPED) -> Registry:
 
     Parameters
     ----------
-    entries : iterable of str
-        ``module:NAME`` each: a `Study`, a `JobKind`, or a sequence of them, at the top level of a module that
-        can be imported.
-    base : Registry
-        The kinds there are without them.
+    entries : ``module:NAME`` each: a `Study`, a `JobKind`, or a sequence of them, at the top level of a
+        module that can be imported.
+    base : the kinds there are without them.
 
     Raises
     ------

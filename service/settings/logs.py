@@ -35,7 +35,8 @@ def about(**fields: object) -> Iterator[None]:
 CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
-# Of a key or a link (`service.db.tokens`): its id may be told, its secret may not, wherever it was written.
+# Of a key or a link (`service.db.repositories.owned`): its id may be told, its secret may not, wherever it
+# was written.
 _SECRET = re.compile(r"((?:stickslip|share)_[0-9a-f]+_)[0-9a-f]+|[0-9a-f]{48,}", re.IGNORECASE)
 # A percent sign that was encoded itself, however often; ASCII in more bytes than it needs.
 _AGAIN, _OVERLONG = re.compile("%(?:25)+"), re.compile(rb"(?:\xf0\x80|\xe0)?[\x80\x81\xc0\xc1]([\x80-\xbf])")

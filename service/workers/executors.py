@@ -24,18 +24,12 @@ class LocalExecutor:
 
     Parameters
     ----------
-    runs : mapping
-        The function of each kind; sent to the processes by name.
-    warm_up : callable
-        Called in every process before it takes an attempt; sent by name.
-    workers : int
-        Number of processes.
-    grace_seconds : float
-        Time between asking an attempt to stop and killing its process [s].
-    pace : Pace
-        How often the processes tell what.
-    limits : ProcessLimits
-        What each process may use.
+    runs : the function of each kind; sent to the processes by name.
+    warm_up : called in every process before it takes an attempt; sent by name.
+    workers : number of processes.
+    grace_seconds : time between asking an attempt to stop and killing its process [s].
+    pace : how often the processes tell what.
+    limits : what each process may use.
     """
 
     def __init__(

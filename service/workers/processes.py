@@ -51,8 +51,7 @@ class Process:
 
     Attributes
     ----------
-    pid : int
-        Its number.
+    pid : its number.
     """
 
     def __init__(self, made: BaseProcess) -> None:

@@ -55,10 +55,8 @@ class Spreading:
 
     Parameters
     ----------
-    helpers : Helpers
-        Who may help.
-    unwanted : callable
-        Whether the attempt itself is not wanted any more: then nothing underway is waited for.
+    helpers : who may help.
+    unwanted : whether the attempt itself is not wanted any more: then nothing underway is waited for.
     """
 
     def __init__(self, helpers: Helpers, unwanted: Callable[[], bool]) -> None:

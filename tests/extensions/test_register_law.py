@@ -182,7 +182,7 @@ between = ["a", "ground"]
 limit = 0.5
 """
     )
-    code = "from service.schemas.law_answers import law_list; print(law_list().model_dump_json())"
+    code = "from service.schemas.answers import law_list; print(law_list().model_dump_json())"
     command = [*COMMAND, "solve", "joined.toml", "--frequency", str(HZ), "--harmonics", "5", "--json"]
     solved, listed = (
         subprocess.run(

@@ -16,8 +16,8 @@ from typing import Any
 from unittest.mock import patch
 
 from service.cli import main
-from service.cli.app import command
 from service.cli.study_command import Outputs
+from service.cli.table import command
 from tests.golden.golden_cases import MEASURED, SHIPPED, Case, own_scenes
 
 DATA = Path(__file__).parent / "data"

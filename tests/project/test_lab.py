@@ -33,7 +33,7 @@ for package in (solver, optim, stickslip):
         getattr(package, name)
 from service.cli.table import COMMANDS
 from service.jobs.kinds import SHIPPED
-from service.cli.app import command
+from service.cli.table import command
 from service.http.app import create_app
 from service.settings.settings import Settings
 names = {f"name {name}" for package in (solver, optim) for name in package.__all__}

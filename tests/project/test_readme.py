@@ -26,9 +26,8 @@ from sector_cases import as_matrices, sector_matrices
 import optim
 import solver
 from service.cli import main
-from service.cli.app import command
 from service.cli.options.problem_inputs import OPTIONS
-from service.cli.table import Deferred
+from service.cli.table import Deferred, command
 from service.jobs.kind_registry import ABOUT_THE_RUN
 from service.jobs.strict_json import validated
 from service.jobs.studies.design_study import Design

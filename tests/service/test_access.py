@@ -22,9 +22,9 @@ from service.auth.authenticator import REMEMBERED_SECONDS, _neighbourhood, calle
 from service.auth.callers import KeyLimits, Scope
 from service.cli import main
 from service.client.client import Client
-from service.db import tokens
 from service.db.clock import utc_now
 from service.db.engine import Database
+from service.db.repositories import owned
 from service.db.repositories.owned import KeyRepository
 from service.errors import InvalidRequestError
 
@@ -53,12 +53,12 @@ def test_only_a_digest_is_kept(database: Database) -> None:
     with database.reading() as connection:
         [row] = connection.execute(text("SELECT * FROM api_key")).all()
     assert made.token.rpartition("_")[2] not in str(row)
-    assert tokens.digest_of(made.token) in row
+    assert owned.digest_of(made.token) in row
     assert made.token not in repr(made)
-    assert tokens.matches(made.token, repository.get(made.row.id))
+    assert owned.matches(made.token, repository.get(made.row.id))
     other = repository.rotate(made.row.id)
-    assert not tokens.matches(made.token, repository.get(made.row.id)), "the old secret ends"
-    assert tokens.matches(other.token, repository.get(made.row.id))
+    assert not owned.matches(made.token, repository.get(made.row.id)), "the old secret ends"
+    assert owned.matches(other.token, repository.get(made.row.id))
     assert caller_of_row(other.row).limits.waiting == 3
     assert repository.usable(utc_now())
     repository.revoke(made.row.id)
@@ -74,7 +74,7 @@ def test_an_unknown_key_is_compared_too(monkeypatch: pytest.MonkeyPatch) -> None
         return real(a, b)
 
     monkeypatch.setattr(hmac, "compare_digest", watched)
-    assert not tokens.matches("stickslip_000000000000_" + "0" * 64, None)
+    assert not owned.matches("stickslip_000000000000_" + "0" * 64, None)
     assert compared == [(64, 64)]
 
 
@@ -103,7 +103,7 @@ def test_the_command_works_beside_a_service_and_a_revoked_key_ends(
     assert (shown["scopes"], shown["limits"]) == (["submit"], {"waiting": 2})
     assert shown["last_used"] is not None
     assert token not in printed
-    assert tokens.digest_of(token) not in printed
+    assert owned.digest_of(token) not in printed
     assert main(["keys", "rotate", shown["id"], *at]) == 0
     rotated = capsys.readouterr().out.strip()
     assert REMEMBERED_SECONDS <= 1.0, "what a key may is looked up again after that"

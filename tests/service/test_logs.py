@@ -14,7 +14,7 @@ from private_kinds import PRIVATE
 from service_helpers import serving
 
 from service.client.embedded import EmbeddedService
-from service.db.tokens import Tokens
+from service.db.repositories.owned import Tokens
 from service.settings import logs
 from service.settings.logs import JsonFormatter, TextFormatter
 

@@ -9,9 +9,9 @@ import pytest
 from each import each
 from service_helpers import ServedClient, is_problem
 
-from service.http import constant
+from service.http import made_once
 from service.http.routes import page
-from service.rendering.page_bundle import bundle
+from service.http.routes.page import bundle
 from solver.results.notes import FLAGS
 
 FOLDER = Path(page.__file__).resolve().parents[2] / "page"
@@ -167,7 +167,7 @@ def test_what_is_constant_is_made_and_packed_once(
 ) -> None:
     plain = shipped.get(path, headers={"Accept-Encoding": "gzip;q=0, br"})
     assert "content-encoding" not in plain.headers
-    monkeypatch.setattr(constant.Constant, "_whole", None)  # nothing is made anew
+    monkeypatch.setattr(made_once.Constant, "_whole", None)  # nothing is made anew
     packed = shipped.get(path)
     assert packed.content == plain.content
     if len(plain.content) >= 1000:

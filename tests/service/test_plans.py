@@ -8,7 +8,7 @@ from sqlalchemy import Select, Update
 from sqlalchemy.dialects import sqlite
 
 from service.db.engine import Database
-from service.db.repositories import job_statements, owned, waiting
+from service.db.repositories import attempts, owned, waiting
 
 BY_KEY = "sqlite_autoindex_job_1"
 
@@ -16,15 +16,15 @@ BY_KEY = "sqlite_autoindex_job_1"
 @pytest.mark.parametrize(
     ("statement", "index"),
     [
-        (job_statements.COMPUTED_BEFORE, "ix_job_spec_hash_state"),
+        (attempts.COMPUTED_BEFORE, "ix_job_spec_hash_state"),
         (waiting.WAITING_OWNERS, "ix_job_state_owner_priority_id"),
         (waiting.NEXT_PRIORITY, "ix_job_state_owner_priority_id"),
         (waiting.NEXT_JOBS, "ix_job_state_owner_priority_id"),
         (owned.OF_JOBS, "ix_job_owner_stored_bytes"),
-        (job_statements.TAKE, BY_KEY),
-        (job_statements.REPORT, BY_KEY),
-        (job_statements.SUCCEED, BY_KEY),
-        (job_statements.BY_ID, BY_KEY),
+        (attempts.TAKE, BY_KEY),
+        (attempts.REPORT, BY_KEY),
+        (attempts.SUCCEED, BY_KEY),
+        (attempts.BY_ID, BY_KEY),
     ],
 )
 def test_it_goes_by_its_index(tmp_path: Path, statement: Select[tuple[object]] | Update, index: str) -> None:

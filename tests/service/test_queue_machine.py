@@ -27,7 +27,7 @@ from sqlalchemy import Integer, String, bindparam, delete, select
 from service.db import revisions
 from service.db.engine import Database
 from service.db.models import Job, JobResult, JobState
-from service.db.repositories import Attempt, JobRepository, NewJob, job_statements
+from service.db.repositories import Attempt, JobRepository, NewJob, attempts
 from service.errors import IdempotencyError, QueueFullError
 from service.jobs.outputs import FailureKind, JobFailure, JobOutput
 
@@ -295,9 +295,9 @@ def unguarded() -> Iterator[None]:
         weak = (Job.id == bindparam("job")) & (Job.state == JobState.RUNNING) & forgotten
         for module in ("attempts", "jobs"):
             patch.setattr(f"service.db.repositories.{module}.OWNED", weak)
-        importlib.reload(job_statements)
+        importlib.reload(attempts)
         yield
-    importlib.reload(job_statements)
+    importlib.reload(attempts)
 
 
 @pytest.mark.long

@@ -10,7 +10,7 @@ import pytest
 from service_helpers import is_problem, pdf_objects, until
 
 from service.errors import ConflictError, TooManyRequestsError
-from service.http.reports import Reports
+from service.http.made_once import Reports
 from service.queue.lanes import Lane
 
 DESIGN = {"kind": "design", "scene": "two-dof", "variables": {"damper.N0": [20, 500]}, "harmonics": 1}

@@ -22,8 +22,7 @@ from service.db.repositories import JobRepository, UploadRepository
 from service.db.repositories.integrity import check
 from service.db.repositories.owned import Projects
 from service.db.repositories.retention_repository import Pruned, RetentionRepository
-from service.db.repositories.run_repository import Runs, Shares
-from service.db.repositories.stored_rows import RunWords
+from service.db.repositories.run_repository import Runs, RunWords, Shares
 from service.errors import ConflictError, DatabaseError, StorageFullError
 from service.jobs.outputs import JobOutput
 from service.jobs.stored_figures import DesignRecord, StoredArray, SweepRecord

@@ -19,8 +19,7 @@ from service.db.engine import Database
 from service.db.models import Job, JobResult, JobState
 from service.db.repositories import JobRepository
 from service.db.repositories.owned import Projects
-from service.db.repositories.run_repository import RunFilter, Runs, _containing
-from service.db.repositories.stored_rows import RunWords
+from service.db.repositories.run_repository import RunFilter, Runs, RunWords, _containing
 from service.errors import (
     ChangedMeanwhileError,
     ConflictError,
@@ -30,7 +29,7 @@ from service.errors import (
 )
 from service.jobs.stored_figures import alone
 from service.jobs.strict_json import JsonText
-from service.schemas.comparisons import differences
+from service.schemas.run_figures import differences
 from solver.scene.scene import load_scene
 
 WAITED = {"Prefer": "wait=60"}

@@ -10,7 +10,7 @@ import typer
 from optim.problem.problem_keys import options as key_options
 from service.cli.commands.report import SUFFIXES, write
 from service.cli.options import inputs, problem_inputs
-from service.cli.options import shared as options
+from service.cli.options import parameters as options
 from service.cli.options.problem_inputs import ProblemFlags, takes_problem
 from service.cli.study_command import Outputs, give, watched
 from service.jobs.common.problem_requests import ProblemRequest

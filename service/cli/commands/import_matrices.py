@@ -12,24 +12,29 @@ from typing import TYPE_CHECKING, Any
 
 from service.cli.importing.import_files import (
     Sources,
+    band,
     dof_table,
+    excitation,
     existing_file,
     read_sources,
     rows_of,
     sources,
+    toml,
 )
-from service.cli.importing.import_reduction import ImportOptions, ReducedModel, reduce, reduced_file
-from service.cli.importing.import_scene import band, excitation, toml
-from service.cli.importing.import_scene import contacts as contact_tables
-from service.cli.importing.patches import Patches
-from service.cli.importing.sector import (
+from service.cli.importing.import_files import contacts as contact_tables
+from service.cli.importing.import_reduction import (
     DiskOptions,
+    ImportOptions,
+    ReducedModel,
     WrittenSector,
     checked_boundaries,
     disk,
     found_by_position,
+    reduce,
     reduce_disk,
+    reduced_file,
 )
+from service.cli.importing.patches import Patches
 from service.cli.options.inputs import new_file, relative
 from service.cli.options.parameters import taking
 from service.errors import InputError

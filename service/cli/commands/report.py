@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.cli.options import inputs
-from service.cli.options import shared as options
+from service.cli.options import parameters as options
 from service.errors import InputError
 from service.rendering.text import say
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from service.cli.importing.import_scene import split
+from service.cli.importing.import_files import split
 from service.errors import InputError
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from typer.models import OptionInfo
 
 from service.cli import completion
 from service.cli.options import inputs
-from service.cli.options import shared as options
+from service.cli.options import parameters as options
 from service.cli.options.inputs import number, whole_number
 from service.cli.options.parameters import Command, keyword, parameters_of
 from service.errors import InputError
@@ -41,16 +41,12 @@ class KeyOption:
 
     Attributes
     ----------
-    key, name : str
-        Of the body, and of the field that is called so there.
-    flag : str
-        As it is written, with its hyphens.
+    key, name : of the body, and of the field that is called so there.
+    flag : as it is written, with its hyphens.
     parameter : inspect.Parameter
         Of the command.
-    schema : mapping
-        JSON schema of the key, without null.
-    metavar : str
-        What stands for its value, where that is said.
+    schema : JSON schema of the key, without null.
+    metavar : what stands for its value, where that is said.
     """
 
     key: str

@@ -1,4 +1,4 @@
-"""Parameters of commands that are not those that are written: made of settings, of keys, of other commands.
+"""Parameters of commands: those that several share, and those made of settings, of keys, of other commands.
 
 The key with which the command talks to a service comes from a file, or from the environment: not from an
 option, for every user of a machine sees the options of its processes.
@@ -15,11 +15,70 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from service.cli.options import shared as options
+from service.cli import completion
+from service.cli.options.inputs import count
 from service.errors import InputError
+from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
     from service.client.client import Client
+
+
+Scene = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENE", help="Name of a shipped scene, or a scene file (.toml, .json).",
+        autocompletion=completion.scenes,
+    ),
+]  # fmt: skip
+AnyScene = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="SCENE", help="Name of a shipped scene, or a scene file; the one of the --problem file.",
+        autocompletion=completion.scenes,
+    ),
+]  # fmt: skip
+Values = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="PATH=VALUE", help=f"Value of a parameter, for example {DISK_LOAD}=150; repeatable.",
+        autocompletion=completion.settings,
+    ),
+]  # fmt: skip
+Harmonics = Annotated[int, count("--harmonics", "H", "Highest harmonic kept.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+Plot = Annotated[
+    str | None,
+    typer.Option("--plot", metavar="F", help="Draw a picture: .png, .svg, .pdf or .html."),
+]
+Out = Annotated[
+    str | None,
+    typer.Option(
+        "--out", metavar="F",
+        help="Write the numbers: F ends in .csv, .parquet, .nc, .npz, .mat or .json.",
+    ),
+]  # fmt: skip
+Database = Annotated[
+    str | None,
+    typer.Option(
+        "--database",
+        metavar="URL",
+        help="sqlite:///path or postgresql://user@host/name; STICKSLIP_DATABASE sets it too.",
+    ),
+]
+Workers = Annotated[
+    int | None,
+    count("--workers", "N", "Worker processes; one a processor."),
+]
+Url = Annotated[
+    str,
+    typer.Option("--url", metavar="URL", envvar="STICKSLIP_URL", help="Where the service is."),
+]
+Wait = Annotated[bool, typer.Option("--wait", help="Wait for the end and print the results.")]
+Job = Annotated[str, typer.Argument(metavar="JOB", help="Id of a job.")]
+
+DEFAULT_URL = "http://127.0.0.1:8000"
+
 
 _Settings = TypeVar("_Settings")
 Command = Callable[..., None]
@@ -79,7 +138,7 @@ def keyed(command: Command) -> Command:
 
     own = inspect.signature(command, eval_str=True, locals={"Client": None}).parameters.values()
     listed = [one for one in own if one.name != "client"]
-    where = [keyword("url", options.Url, options.DEFAULT_URL), keyword("key_file", KeyFile, None)]
+    where = [keyword("url", Url, DEFAULT_URL), keyword("key_file", KeyFile, None)]
     return with_parameters(with_client, [*listed, *where])
 
 
@@ -98,9 +157,7 @@ def client_of(url: str, key_file: str | None) -> Client:
     try:
         return Client(url, key=_key(key_file))
     except httpx.InvalidURL as error:
-        raise InputError(
-            f"`--url` must be a web address such as {options.DEFAULT_URL}, got {url!r}"
-        ) from error
+        raise InputError(f"`--url` must be a web address such as {DEFAULT_URL}, got {url!r}") from error
 
 
 def _key(file: str | None) -> str | None:

@@ -18,7 +18,7 @@ from optim.problem.problem_keys import DesignKeys, FrontKeys, options
 from service.cli import completion
 from service.cli.completion import SCENE_FILES
 from service.cli.failures import refused
-from service.cli.options import inputs, shared
+from service.cli.options import inputs, parameters
 from service.cli.options.inputs import number, whole_number
 from service.cli.options.parameters import Command, keyword, parameters_of, with_parameters
 from service.errors import InputError
@@ -91,7 +91,7 @@ def takes_problem(keys: Mapping[str, Option]) -> Callable[[Command], Command]:
     keys : key to its option, of those that the problem has.
     """
     given_as: dict[str, Any] = {
-        "problem": File, **{name: _option(one) for name, one in keys.items()}, "values": shared.Values,
+        "problem": File, **{name: _option(one) for name, one in keys.items()}, "values": parameters.Values,
     }  # fmt: skip
     own = [keyword(name, annotation, None) for name, annotation in given_as.items()]
 

@@ -1,9 +1,12 @@
-"""Attempts at jobs: the guard of every change, leases, what is kept for a later one, jobs taken back."""
+"""Attempts at jobs: the guard of every change, leases, what is kept for a later one, jobs taken back.
+
+The statements of the busy methods of `JobRepository` stand here too: building one costs more than running it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, fields, replace
 from datetime import datetime
 from typing import Any
 
@@ -12,19 +15,90 @@ from sqlalchemy import (
     Connection,
     Select,
     Table,
+    Text,
+    Update,
     and_,
     bindparam,
     case,
+    cast,
     delete,
+    func,
     insert,
     select,
     update,
 )
 
 from service.db.engine import Database
-from service.db.models import Checkpoint, Job, JobState
-from service.db.repositories.stored_rows import Attempt, RecoveredJobs
+from service.db.models import NOBODY, Checkpoint, Job, JobResult, JobState
+from service.db.repositories.run_repository import NO_WORDS, JobRow, RunWords, in_the_bin
 from service.jobs.outputs import FailureKind, JobFailure, ResultPiece
+from service.jobs.strict_json import JsonText
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewJob:
+    """A job to be inserted."""
+
+    kind: str
+    request: dict[str, Any]
+    spec: dict[str, Any] | JsonText
+    spec_hash: str
+    request_hash: str
+    max_attempts: int
+    scene_name: str | None = None
+    scene_hash: str | None = None
+    priority: int = 0
+    fresh: bool = False
+    idempotency_key: str | None = None
+    owner: str = NOBODY
+    seconds_limit: float | None = None
+    words: RunWords = NO_WORDS
+    trace: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Attempt:
+    """One attempt at a job: what a worker needs, and what guards the write of its outcome.
+
+    Attributes
+    ----------
+    created : when its job was handed in.
+    spec_hash : digest of what is computed, to which its checkpoints belong.
+    seconds_limit : longest time it may take [s], if the job has a limit of its own.
+    trace : the `traceparent` it is part of, if there are traces.
+    progress, points : how far earlier attempts got, as far as `saved` goes; 0 without it.
+    saved : what they kept.
+    """
+
+    job_id: str
+    kind: str
+    spec: dict[str, Any]
+    attempt: int
+    max_attempts: int
+    lease_owner: str
+    created: datetime
+    spec_hash: str = ""
+    owner: str = NOBODY
+    seconds_limit: float | None = None
+    trace: str | None = None
+    progress: float = 0.0
+    points: int = 0
+    saved: tuple[ResultPiece, ...] = field(default=(), compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecoveredJobs:
+    """What became of running jobs whose owner is gone."""
+
+    accepted: int = 0
+    failed: int = 0
+    dismissed: int = 0
+
+    @property
+    def total(self) -> int:
+        """All of them."""
+        return self.accepted + self.failed + self.dismissed
+
 
 # Built once: it goes with the end of every job.
 _DROP = delete(Checkpoint).where(Checkpoint.job_id == bindparam("job"))
@@ -181,3 +255,76 @@ def recover(
             drop_checkpoint(connection, row.id)
         counts[values["state"].value] += 1
     return RecoveredJobs(**counts)
+
+
+_RESULT: Table = JobResult.metadata.tables["job_result"]
+
+ROW = [item.name for item in fields(JobRow)]
+NEW_COLUMNS = [item.name for item in fields(NewJob) if item.name not in ("fresh", "words")]
+INITIAL: dict[str, Any] = {
+    "state": JobState.ACCEPTED, "attempt": 0, "cancel_requested": False, "progress": 0.0, "points": 0,
+    "best": None,
+    "started": None, "finished": None, "result_of": None, "error": None,
+}  # fmt: skip
+"""What a job begins with."""
+
+INSERT_JOB = insert(_JOB)
+INSERT_RESULT = insert(_RESULT)
+
+BY_ID = select(*(_C[name] for name in ROW)).where(_C.id == bindparam("job"))
+SEVERAL = select(*(_C[name] for name in ROW)).where(_C.id.in_(bindparam("jobs", expanding=True)))
+SCENE = select(_C.scene_name, _C.scene_hash).where(_C.id == bindparam("job"))
+RESULT = select(_RESULT.c.body).where(_RESULT.c.job_id == bindparam("job"))
+FIGURES = select(_RESULT.c.figures).where(_RESULT.c.job_id == bindparam("job"))
+RESULT_TEXT = select(cast(_RESULT.c.body, Text)).where(_RESULT.c.job_id == bindparam("job"))
+ADD_STORED = (
+    update(_JOB).where(_C.id == bindparam("job")).values(stored_bytes=_C.stored_bytes + bindparam("more"))
+)
+
+# Not ordered by the bare `id`: SQLite would walk all jobs of an owner by the index (owner, id).
+COMPUTED_BEFORE = (
+    select(_C.id)
+    .where(_C.spec_hash == bindparam("hash"), _C.state == JobState.SUCCESSFUL, _C.result_of.is_(None))
+    .where(_C.owner == bindparam("owner"), ~in_the_bin(Job.id))
+    .order_by(_C.id.concat("").desc())
+    .limit(1)
+)
+
+_FIRST = select(func.min(_C.id)).where(_C.state == JobState.ACCEPTED).scalar_subquery()
+OLDEST_WAITING = select(_C.created).where(_C.id == _FIRST)
+
+_NOT_OF_THE_ROW = ("job_id", "lease_owner", "saved")
+TAKEN = ["id", *(item.name for item in fields(Attempt) if item.name not in _NOT_OF_THE_ROW)]
+"""What of a waiting job makes an attempt."""
+TAKE = (
+    update(_JOB)
+    .where(_C.id == bindparam("job"), _C.state == JobState.ACCEPTED)
+    .values(
+        state=JobState.RUNNING,
+        attempt=bindparam("number"),
+        lease_owner=bindparam("holder"),
+        lease_until=bindparam("until"),
+        started=bindparam("begun"),
+    )
+)
+
+
+def _guarded(*conditions: ColumnElement[bool]) -> Update:
+    """A change of the row of an attempt that still owns it."""
+    return update(_JOB).where(OWNED, *conditions)
+
+
+REPORT = _guarded().values(
+    progress=bindparam("fraction"),
+    points=bindparam("counted"),
+    best=bindparam("told", type_=_C.best.type),
+    lease_until=bindparam("until"),
+)
+SUCCEED = _guarded(_C.cancel_requested.is_(False)).values(
+    state=JobState.SUCCESSFUL,
+    finished=bindparam("ended"),
+    stored_bytes=_C.stored_bytes + bindparam("more"),
+    progress=1.0,
+    lease_owner=None,
+    lease_until=None,
+)

@@ -10,8 +10,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Connection, Engine, Select, Text, and_, cast, exists, func, select, text
 from sqlalchemy.exc import DBAPIError
 
-from service.db.arrays_outside import ArrayStore, array_store
-from service.db.engine import database_name, database_path, is_sqlite, read_engine
+from service.db.engine import ArrayStore, array_store, database_name, database_path, is_sqlite, read_engine
 from service.db.models import Job, JobResult, JobState, Project, Result, Run, SweepArray, Upload
 from service.db.repositories.result_repository import whole
 from service.db.revisions import head_revision, off_head
@@ -152,12 +151,9 @@ class Findings:
 
     Attributes
     ----------
-    revision, wanted : str
-        The revision of the tables, and that of this version.
-    trouble : tuple of str
-        What is wrong, in words; empty for a sound database.
-    contents : Contents
-        How much it holds.
+    revision, wanted : the revision of the tables, and that of this version.
+    trouble : what is wrong, in words; empty for a sound database.
+    contents : how much it holds.
     """
 
     revision: str

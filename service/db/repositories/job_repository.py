@@ -14,10 +14,13 @@ from service.db.clock import Clock, SharedClock, new_id, utc_now
 from service.db.engine import Database
 from service.db.models import NOBODY, Job, JobState
 from service.db.pagination import met, owner_condition, plain_conditions
-from service.db.repositories import job_statements
+from service.db.repositories import attempts
 from service.db.repositories.attempts import (
     FREE,
     OWNED,
+    Attempt,
+    NewJob,
+    RecoveredJobs,
     as_far_as_kept,
     change,
     change_owned,
@@ -29,8 +32,7 @@ from service.db.repositories.attempts import (
     with_what_was_kept,
 )
 from service.db.repositories.result_repository import insert_results
-from service.db.repositories.run_repository import in_the_bin, insert_words, require_project
-from service.db.repositories.stored_rows import Attempt, JobRow, NewJob, RecoveredJobs
+from service.db.repositories.run_repository import JobRow, in_the_bin, insert_words, require_project
 from service.db.repositories.waiting import Room, Turns, require_share
 from service.errors import IdempotencyError
 from service.jobs.outputs import Best, JobFailure, JobOutput, ResultPiece
@@ -78,11 +80,9 @@ class JobRepository:
 
     Parameters
     ----------
-    database : Database
-        Where they are.
-    now : callable, optional
-        The clock that leases and times are read from: by default that of this machine where one service
-        has the database for itself, that of the server where several share it.
+    database : where they are.
+    now : the clock that leases and times are read from: by default that of this machine where one service has
+        the database for itself, that of the server where several share it.
     """
 
     def __init__(self, database: Database, now: Clock | None = None) -> None:
@@ -133,13 +133,13 @@ class JobRepository:
     def get(self, job_id: str) -> JobRow | None:
         """The job, or None."""
         with self._db.looking() as connection:
-            row = connection.execute(job_statements.BY_ID, {"job": job_id}).mappings().one_or_none()
+            row = connection.execute(attempts.BY_ID, {"job": job_id}).mappings().one_or_none()
         return None if row is None else JobRow(**row)
 
     def several(self, job_ids: Sequence[str]) -> dict[str, JobRow]:
         """Those of the jobs that there are, by id."""
         with self._db.looking() as connection:
-            rows = connection.execute(job_statements.SEVERAL, {"jobs": job_ids}).mappings()
+            rows = connection.execute(attempts.SEVERAL, {"jobs": job_ids}).mappings()
             return {row["id"]: JobRow(**row) for row in rows}
 
     def page(
@@ -169,17 +169,17 @@ class JobRepository:
     def result(self, job_id: str) -> dict[str, Any] | None:
         """The result of a job, or None if it has none."""
         with self._db.looking() as connection:
-            return connection.execute(job_statements.RESULT, {"job": job_id}).scalar_one_or_none()
+            return connection.execute(attempts.RESULT, {"job": job_id}).scalar_one_or_none()
 
     def result_text(self, job_id: str) -> str | None:
         """The result of a job as its JSON, None if it has none."""
         with self._db.looking() as connection:
-            return connection.execute(job_statements.RESULT_TEXT, {"job": job_id}).scalar_one_or_none()
+            return connection.execute(attempts.RESULT_TEXT, {"job": job_id}).scalar_one_or_none()
 
     def figures(self, job_id: str) -> dict[str, Any]:
         """What of the result of a job is compared with another's; empty if it has none."""
         with self._db.looking() as connection:
-            row = connection.execute(job_statements.FIGURES, {"job": job_id}).one_or_none()
+            row = connection.execute(attempts.FIGURES, {"job": job_id}).one_or_none()
         if row is None:
             return {}
         # Of a result that an earlier version stored.
@@ -203,7 +203,7 @@ class JobRepository:
     def oldest_waiting(self) -> datetime | None:
         """When the job was handed in that waits for longest, None if none waits; ids ascend with time."""
         with self._db.looking() as connection:
-            return connection.execute(job_statements.OLDEST_WAITING).scalar_one_or_none()
+            return connection.execute(attempts.OLDEST_WAITING).scalar_one_or_none()
 
     def claim(self, owner: str, lease_until: datetime) -> Attempt | None:
         """Take the next waiting job for `owner`; None if none waits."""
@@ -220,7 +220,7 @@ class JobRepository:
             return []
         taken = {"holder": owner, "until": lease_until, "begun": self.now()}
         changes = [{"job": row.id, "number": row.attempt + 1, **taken} for row in found]
-        connection.execute(job_statements.TAKE, changes)
+        connection.execute(attempts.TAKE, changes)
         return [_attempt(row, owner) for row in found]
 
     def report(
@@ -233,7 +233,7 @@ class JobRepository:
         """
         values = {"fraction": fraction, "counted": points, "until": lease_until, "told": best}
         with self._db.writing() as connection:
-            return _guarded(connection, job_statements.REPORT, attempt, values)
+            return _guarded(connection, attempts.REPORT, attempt, values)
 
     def keep(
         self,
@@ -251,7 +251,7 @@ class JobRepository:
         """
         values = {"fraction": fraction, "counted": max(points, 1), "until": lease_until, "told": None}
         with self._db.writing() as connection:
-            owned = _guarded(connection, job_statements.REPORT, attempt, values)
+            owned = _guarded(connection, attempts.REPORT, attempt, values)
             if owned:
                 store_pieces(connection, attempt, pieces, self.now(), anew=anew)
             return owned
@@ -268,7 +268,7 @@ class JobRepository:
         placed = self._placed(attempt, output)
 
         def write(connection: Connection) -> bool:
-            if not _guarded(connection, job_statements.SUCCEED, attempt, values):
+            if not _guarded(connection, attempts.SUCCEED, attempt, values):
                 return False
             drop_checkpoint(connection, attempt.job_id)
             self._store(connection, attempt, placed, finished)
@@ -293,7 +293,7 @@ class JobRepository:
                 drop_checkpoint(connection, attempt.job_id)
             if changed and output is not None and placed is not None:
                 more = {"job": attempt.job_id, "more": _bytes_of(output)}
-                connection.execute(job_statements.ADD_STORED, more)
+                connection.execute(attempts.ADD_STORED, more)
                 self._store(connection, attempt, placed, finished)
             return changed
 
@@ -388,21 +388,21 @@ class JobRepository:
     @staticmethod
     def _computed_before(connection: Connection, new: NewJob) -> str | None:
         known = {"hash": new.spec_hash, "owner": new.owner}
-        return connection.execute(job_statements.COMPUTED_BEFORE, known).scalar_one_or_none()
+        return connection.execute(attempts.COMPUTED_BEFORE, known).scalar_one_or_none()
 
     def _insert(self, connection: Connection, new: NewJob, source: str | None) -> JobRow:
         """Insert a job; its row is what was written, not read again."""
         now = self.now()
-        values = {name: getattr(new, name) for name in job_statements.NEW_COLUMNS}
+        values = {name: getattr(new, name) for name in attempts.NEW_COLUMNS}
         values |= {"id": new_id(), "created": now, "result_of": source, "state": JobState.ACCEPTED}
         if source is not None:
             values |= {"state": JobState.SUCCESSFUL, "started": now, "finished": now, "progress": 1.0}
-        written: dict[str, Any] = job_statements.INITIAL | values
+        written: dict[str, Any] = attempts.INITIAL | values
         request, spec = encoded(new.request), encoded(new.spec)
         stored = {"request": request, "spec": spec, "stored_bytes": len(request) + len(spec)}
-        connection.execute(job_statements.INSERT_JOB, written | stored)
+        connection.execute(attempts.INSERT_JOB, written | stored)
         insert_words(connection, written["id"], new.words, now)
-        return JobRow(**{name: written[name] for name in job_statements.ROW})
+        return JobRow(**{name: written[name] for name in attempts.ROW})
 
     def _placed(self, attempt: Attempt, output: JobOutput) -> JobOutput:
         """The output with its large arrays outside of the database, if that is where they belong.
@@ -427,7 +427,7 @@ class JobRepository:
             "job_id": job_id, "body": body, "sha256": hashlib.sha256(text).hexdigest(),
             "figures": encoded(output.alone or alone(output.result)),
         }  # fmt: skip
-        connection.execute(job_statements.INSERT_RESULT, written)
+        connection.execute(attempts.INSERT_RESULT, written)
         insert_results(connection, job_id, output.sweeps, created, owner)
-        about = connection.execute(job_statements.SCENE, {"job": job_id}).one()
+        about = connection.execute(attempts.SCENE, {"job": job_id}).one()
         insert_results(connection, job_id, output.records(attempt.kind, *about), created, owner)

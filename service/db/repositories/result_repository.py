@@ -28,9 +28,8 @@ from sqlalchemy import (
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import aliased
 
-from service.db.arrays_outside import ArrayStore
 from service.db.clock import new_id
-from service.db.engine import Database
+from service.db.engine import ArrayStore, Database
 from service.db.models import NOBODY, Figure, Job, Quantity, Result, SweepArray
 from service.db.pagination import (
     Condition,

@@ -12,7 +12,7 @@ from sqlalchemy.orm import aliased
 
 from service.db.engine import Database
 from service.db.models import Job, JobState, Project, Result, Run, Share, SweepArray, Upload
-from service.db.repositories.job_statements import ADD_STORED
+from service.db.repositories.attempts import ADD_STORED
 from service.jobs.common.scene_requests import UPLOAD
 from service.jobs.stored_figures import DESIGN, SWEEP
 

@@ -46,12 +46,52 @@ from service.db.models import (
     Share,
 )
 from service.db.pagination import Condition, Position, met, owner_condition, plain_conditions, refused
-from service.db.repositories.owned import Binned, Rows
-from service.db.repositories.stored_rows import NO_WORDS, JobRow, RunWords
-from service.db.tokens import Made, Tokens, digest_of, matches
+from service.db.repositories.owned import Binned, Made, Rows, Tokens, digest_of, matches
 from service.errors import ConflictError, InvalidRequestError, NotFoundError
 from service.jobs.stored_figures import SWEEP
 from solver.errors import Shown
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobRow:
+    """A job without its spec and its result; `request` is None in lists, it may hold a whole scene."""
+
+    id: str
+    kind: str
+    state: JobState
+    priority: int
+    scene_name: str | None
+    scene_hash: str | None
+    spec_hash: str
+    request_hash: str
+    owner: str
+    idempotency_key: str | None
+    seconds_limit: float | None
+    attempt: int
+    max_attempts: int
+    cancel_requested: bool
+    progress: float
+    points: int
+    best: dict[str, Any] | None
+    created: datetime
+    started: datetime | None
+    finished: datetime | None
+    result_of: str | None
+    error: dict[str, Any] | None
+    request: dict[str, Any] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunWords:
+    """What is said of a run: the id of its project, its name, its notes, the words it is marked with."""
+
+    project: str | None = None
+    name: str = ""
+    notes: str = ""
+    tags: tuple[str, ...] = ()
+
+
+NO_WORDS = RunWords()
 
 _TABLES = Run.metadata.tables
 _RUN, _TAG = _TABLES["run"], _TABLES["run_tag"]
@@ -135,12 +175,9 @@ class RunRow:
 
     Attributes
     ----------
-    revision : int
-        Counts the changes of its words; 0 if there was none.
-    changed, deleted : datetime or None
-        When its words were changed last, when it was put in the bin.
-    sweeps : int
-        How many sweeps are stored with it.
+    revision : counts the changes of its words; 0 if there was none.
+    changed, deleted : when its words were changed last, when it was put in the bin.
+    sweeps : how many sweeps are stored with it.
     """
 
     job: JobRow
@@ -167,18 +204,12 @@ class RunFilter:
 
     Attributes
     ----------
-    sees : str or None
-        Whose runs are there; None for everybody's.
-    status : sequence of JobState
-        In one of them; any if empty.
-    tag : sequence of str
-        Marked with all of them.
-    text : str or None
-        In the name or the notes, whatever its case.
-    created_after, created_before : datetime or None
-        Handed in at the earliest, and earlier than.
-    deleted : bool
-        Those in the bin in place of those outside.
+    sees : whose runs are there; None for everybody's.
+    status : in one of them; any if empty.
+    tag : marked with all of them.
+    text : in the name or the notes, whatever its case.
+    created_after, created_before : handed in at the earliest, and earlier than.
+    deleted : those in the bin in place of those outside.
     """
 
     sees: str | None = NOBODY

@@ -17,7 +17,7 @@ from sqlalchemy import Connection, bindparam, func, literal, select, text
 
 from service.db import postgresql
 from service.db.models import Job, JobState
-from service.db.repositories.job_statements import TAKEN
+from service.db.repositories.attempts import TAKEN
 from service.errors import QueueFullError, TooManyRequestsError
 
 _C = Job.metadata.tables["job"].c

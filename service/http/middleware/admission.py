@@ -36,8 +36,7 @@ class ConcurrencyLimits:
 
     Parameters
     ----------
-    settings : Settings
-        The limits, of keys that have none of their own.
+    settings : the limits, of keys that have none of their own.
     """
 
     def __init__(self, settings: Settings) -> None:

@@ -37,14 +37,10 @@ class Connections:
 
     Parameters
     ----------
-    most : int
-        How many there may be. For one more, the one that has been idle for longest is closed.
-    header_seconds : float
-        Time the headers of a request may take to arrive [s].
-    write_seconds : float
-        Time in which a client must take something of its answer [s].
-    unsent_bytes : int
-        Most that one owner's clients may leave untaken.
+    most : how many there may be. For one more, the one that has been idle for longest is closed.
+    header_seconds : time the headers of a request may take to arrive [s].
+    write_seconds : time in which a client must take something of its answer [s].
+    unsent_bytes : most that one owner's clients may leave untaken.
     """
 
     def __init__(self, most: int, header_seconds: float, write_seconds: float, unsent_bytes: int) -> None:

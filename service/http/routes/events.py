@@ -152,16 +152,11 @@ async def job_events(
 
     Parameters
     ----------
-    service : Service
-        Runs the job, or shares its database with the one that does.
-    job_id : str
-        A job there is.
-    caller : Caller
-        Who may see it.
-    last_event_id : str or None
-        What the client was told last: points it has are not sent again.
-    looks : Looks, optional
-        Of all streams of the service; its own if it is the only one.
+    service : runs the job, or shares its database with the one that does.
+    job_id : a job there is.
+    caller : who may see it.
+    last_event_id : what the client was told last: points it has are not sent again.
+    looks : of all streams of the service; its own if it is the only one.
     """
     looks = looks or Looks(service)
     wakeup, story = _Wakeup(), _Story(last_event_id)

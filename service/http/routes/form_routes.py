@@ -9,14 +9,12 @@ from fastapi import APIRouter, Body, Request, Response
 from pydantic import ConfigDict, Field
 
 from service.errors import InvalidRequestError
-from service.http.constant import Constant
 from service.http.dependencies import InContext, TypedRoute
+from service.http.made_once import Constant
 from service.jobs.kind_registry import JobKind, Registry
 from service.jobs.kinds.bodies import body_model
 from service.jobs.strict_json import encoded
-from service.schemas.answers import AnswerModel, KindAnswer, KindList
-from service.schemas.law_answers import LawList, law_list
-from service.schemas.pages import AskedModel
+from service.schemas.answers import AnswerModel, AskedModel, KindAnswer, KindList, LawList, law_list
 from solver.contacts.laws.law_registry import laws as known_laws
 from solver.errors import SceneError
 from solver.scene.json_schema import plain, scene_schema

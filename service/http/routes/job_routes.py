@@ -28,7 +28,7 @@ from service.http.dependencies import (
     with_raw,
 )
 from service.http.in_lane import prepared, reading
-from service.http.large_answers import LargeAnswers
+from service.http.made_once import LargeAnswers
 from service.jobs.kind_registry import JobRequest, Registry
 from service.jobs.kinds.bodies import (
     DESIGN,
@@ -37,19 +37,21 @@ from service.jobs.kinds.bodies import (
     design_body,
     examples,
     examples_of,
-    request_of,
 )
 from service.queue.core import Service
 from service.schemas.answers import (
+    Cursor,
     FinishedJob,
     JobAnswer,
     JobPage,
     JobScene,
+    Limit,
+    ListQuery,
     ResultsAnswer,
     ResultsHead,
     SweepAnswer,
+    newest,
 )
-from service.schemas.pages import Cursor, Limit, ListQuery, newest
 
 router = APIRouter(prefix="/v1", tags=["jobs"])
 
@@ -165,14 +167,13 @@ AskedDependency = Annotated[SubmissionHeaders, Depends(asked)]
 def submissions(registry: Registry) -> APIRouter:
     """The routes that take jobs; their bodies are those of the kinds there are."""
 
-    async def submit(body: JobRequest, context: InContext, asked: AskedDependency) -> Response:
+    async def submit(body: JobRequest, context: InContext, asked: AskedDependency) -> Response:  # noqa: ARG001
         """Accept a job. With `Prefer: wait=N` the answer waits up to N seconds for its end."""
-        return await _submit(context, asked, await context.request.json(), body)
+        return await _submit(context, asked, await context.request.json())
 
-    async def submit_design(body: JobRequest, context: InContext, asked: AskedDependency) -> Response:
+    async def submit_design(body: JobRequest, context: InContext, asked: AskedDependency) -> Response:  # noqa: ARG001
         """Accept a design: a job of the kind `design`."""
-        raw = await context.request.json()
-        return await _submit(context, asked, {**raw, KIND: DESIGN}, body)
+        return await _submit(context, asked, {**await context.request.json(), KIND: DESIGN})
 
     taking = APIRouter(prefix="/v1", tags=["jobs"], route_class=TypedRoute)
     takes_body(submit, any_body(registry), examples(registry), by=KIND if len(registry) > 1 else None)
@@ -182,16 +183,10 @@ def submissions(registry: Registry) -> APIRouter:
     return taking
 
 
-async def _submit(
-    context: Context, asked: SubmissionHeaders, raw: dict[str, Any], body: JobRequest
-) -> Response:
+async def _submit(context: Context, asked: SubmissionHeaders, body: dict[str, Any]) -> Response:
     service, caller = context.service, context.caller
-    kind = service.registry.get(raw[KIND])
-    request = request_of(kind, body)
-    found = await prepared(context, kind, request, raw)
-    row, _ = await service.lanes.writes.run(
-        caller.owner, service.accept, kind, request, raw, asked.key, caller, found
-    )
+    found = await prepared(context, body)
+    row, _ = await service.lanes.writes.run(caller.owner, service.submit, body, asked.key, caller, found)
     headers = {"Location": f"/v1/jobs/{row.id}"}
     answer = partial(_job_or_result, service, headers)
     if asked.seconds is not None:

@@ -17,7 +17,7 @@ from service.http.in_lane import reading
 from service.http.middleware.every_answer import HEADERS_ONLY
 from service.queue.core import Service
 from service.queue.running import EVERY, Event
-from service.schemas.run_summaries import run_summary
+from service.schemas.run_figures import run_summary
 from service.schemas.workbench_answers import RunAnswer, RunSummary
 
 router = APIRouter(prefix="/v1/runs", tags=["runs"], route_class=TypedRoute)

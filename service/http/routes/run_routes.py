@@ -35,15 +35,14 @@ from service.http.dependencies import (
     wait_for_end,
 )
 from service.http.in_lane import reading, writing, writing_files
+from service.http.made_once import Reports
 from service.http.middleware.admission import LINKED
-from service.http.reports import Reports
 from service.http.routes.job_routes import results_answer
 from service.http.routes.stored import SWEEP_FORMS, SweepForm, sweep_answer
 from service.jobs.strict_json import digest
 from service.rendering.representations import JSON, chosen
-from service.schemas.answers import JobScene, ResultsAnswer, SweepAnswer, SweepDetail
-from service.schemas.comparisons import comparison
-from service.schemas.pages import newest, page_of
+from service.schemas.answers import JobScene, ResultsAnswer, SweepAnswer, SweepDetail, newest, page_of
+from service.schemas.run_figures import comparison
 from service.schemas.workbench_answers import (
     Comparison,
     NewLink,

@@ -18,13 +18,20 @@ from service.jobs import answering
 from service.jobs.answering import PLAN, PREVIEW, STORE
 from service.jobs.common.scene_parameters import SceneParameterList
 from service.jobs.common.scene_requests import SceneRequest
-from service.jobs.kinds.bodies import KIND, any_body, examples, request_of
-from service.jobs.kinds.preview_request import PreviewRequest
-from service.jobs.kinds.previews import PREVIEWS
+from service.jobs.kinds.bodies import KIND, any_body, examples
+from service.jobs.kinds.previews import PREVIEWS, PreviewRequest
 from service.jobs.studies.plan_study import EXAMPLE, Plan, plan_result
 from service.queue.scene_store import shipped
-from service.schemas.answers import SceneAnswer, SceneDetail, SceneList
-from service.schemas.pages import AskedModel, Cursor, Limit, ListQuery, page_of
+from service.schemas.answers import (
+    AskedModel,
+    Cursor,
+    Limit,
+    ListQuery,
+    SceneAnswer,
+    SceneDetail,
+    SceneList,
+    page_of,
+)
 from solver.scene.descriptions import DAMPER_LOAD
 
 texts = APIRouter(prefix="/v1/scenes", tags=["scenes"], route_class=TypedRoute)
@@ -206,12 +213,11 @@ async def preview(body: PreviewRequest, context: InContext) -> Response:
     """
     service, caller = context.service, context.caller
     raw = await context.request.json()
-    kind = service.previews.registry[raw[KIND]]
-    found = await prepared(context, kind, request_of(kind, body), raw, PREVIEW)
+    found = await prepared(context, raw, PREVIEW)
     asking = f"{caller.owner} {body.client}" if body.client else ""
     most = share(caller, service.settings, "previews")
     spec = json.loads(found.spec)
-    answer = await service.previews.compute(kind.name, spec, asking, caller.owner, most)
+    answer = await service.previews.compute(raw[KIND], spec, asking, caller.owner, most)
     return Response(answer, media_type="application/json", headers={"Cache-Control": "no-store"})
 
 

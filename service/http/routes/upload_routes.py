@@ -17,6 +17,7 @@ from service.http.in_lane import computed, reading, writing
 from service.jobs import answering
 from service.jobs.common.scene_requests import SceneRequest
 from service.jobs.strict_json import validated
+from service.schemas.answers import AskedModel, Cursor, Limit, ListQuery, newest
 from service.schemas.matrix_answers import (
     FormatAnswer,
     FormatsAnswer,
@@ -26,7 +27,6 @@ from service.schemas.matrix_answers import (
     UploadedArray,
     UploadPage,
 )
-from service.schemas.pages import AskedModel, Cursor, Limit, ListQuery, newest
 from service.uploads.uploads import PART, file_name, format_of
 
 router = APIRouter(prefix="/v1/uploads", tags=["uploads"])

@@ -1,18 +1,21 @@
-"""What studies share that solve the balance, or look at the response over the range of a parameter."""
+"""What studies share that solve the balance, look at the range of a parameter, or prove what they find."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
 from optim.criteria.key import Share
+from service.jobs.common.result_models import Table
 from service.jobs.common.scene_requests import HarmonicRequest, Number, ParameterPath, check
 from service.jobs.common.sizes import balance_issues
 from service.jobs.kind_registry import Flag
+from service.jobs.study import Answer, Watch
 from solver.errors import Issue, Naming, Shown
+from solver.lab import from_lab
 from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
@@ -114,3 +117,39 @@ def of_keys(issues: list[Issue], keys: Collection[str], other: str = "scene") ->
         one if keys and one.subject[0] in keys else Issue((other,), one.message, named=False)
         for one in issues
     ]
+
+
+Certify = Annotated[
+    bool, Field(strict=True, description="Prove the peaks found, where contacts are piecewise linear.")
+]
+CERTIFICATES: Any = (
+    list[Table] | None,
+    Field(None, description="Of `certify`: whether each is proved, in which bounds, and the proofs."),
+)
+
+
+def prepare(scene: Scene, *, rigid: bool = True) -> None:
+    """Refuse what cannot be proved before anything is computed; `rigid`: friction may be."""
+    from_lab("proofs.certificate:check_certifiable")(scene, rigid=rigid)
+
+
+def with_proofs(
+    answer: Answer, peaks: Sequence[tuple[Scene, float]], least_over: str, watch: Watch
+) -> Answer:
+    """Return an answer with proofs of peaks; it falls short if one is not proved.
+
+    Arguments as of `stickslip.lab.proofs.certified_peaks.certified_peaks`.
+    """
+    certified_peaks = from_lab("proofs.certified_peaks:certified_peaks")
+    return with_certificates(
+        answer, certified_peaks(peaks, least_over=least_over, should_stop=watch.should_stop)
+    )
+
+
+def with_certificates(answer: Answer, found: Sequence[Any]) -> Answer:
+    """Return an answer with certificates; it falls short if one is not reached."""
+    missing = [each.status.value for each in found if not each.reached]
+    return answer._replace(
+        json=answer.json | {"certificates": [each.to_json() for each in found]},
+        reached=answer.reached and not missing, status=missing[0] if missing else answer.status,
+    )  # fmt: skip

@@ -29,12 +29,9 @@ def sweep_record(
 
     Parameters
     ----------
-    branch : AnyBranch
-        With at least one point.
-    frequency_hz : float or None
-        Excitation frequency [Hz], if another parameter was swept.
-    intermediate : bool
-        Whether it was computed on the way to another result.
+    branch : with at least one point.
+    frequency_hz : excitation frequency [Hz], if another parameter was swept.
+    intermediate : whether it was computed on the way to another result.
     """
     scene, parameter = branch.scene, branch.parameter
     peak = branch.peak

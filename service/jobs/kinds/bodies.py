@@ -8,9 +8,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field, create_model
 
-from service.jobs.kind_registry import JobKind, JobRequest, Registry
+from service.jobs.kind_registry import KIND, JobRequest, Registry
 
-KIND = "kind"
 DESIGN = "design"
 _WORD = "Request"
 
@@ -83,13 +82,6 @@ def _only_design(value: object) -> object:
     if value != DESIGN:
         raise ValueError(f"`kind` must be design here or be left out, got {value!r}")
     return value
-
-
-def request_of(kind: JobKind, body: BaseModel) -> JobRequest:
-    """The request in a body that was checked, without its `kind`."""
-    fields = kind.request.model_fields
-    values = {name: getattr(body, name) for name in fields}
-    return kind.request.model_construct(body.model_fields_set & fields.keys(), **values)
 
 
 def examples(registry: Registry) -> dict[str, Any]:

@@ -13,9 +13,9 @@ import optim
 from optim.criteria.key import Form, Option
 from optim.problem.problem_keys import OPTIONS, ROBUST, NominalAndRobustKeys, of_design
 from service.jobs.common.problem_requests import CERTIFY, ProblemRequest, arguments
-from service.jobs.common.proofs import CERTIFICATES, prepare, with_proofs
 from service.jobs.common.result_models import PeakAt, Table, answered
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.common.study_keys import CERTIFICATES, prepare, with_proofs
 from service.jobs.kind_registry import Json, ReadSweep, StoredSweep
 from service.jobs.outputs import JobOutput
 from service.jobs.stored_figures import SweepRecord

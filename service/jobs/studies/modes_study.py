@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import BaseModel, Field, RootModel
 
 import solver
-from service.jobs.common.proofs import CERTIFICATES, prepare, with_certificates
 from service.jobs.common.result_models import Table, answered
 from service.jobs.common.scene_requests import HarmonicRequest, Number, PositiveNumber, check
 from service.jobs.common.sizes import MOST_MOTIONS, POINTS_OF_A_SWEEP, balance_issues
-from service.jobs.common.study_keys import of_keys
+from service.jobs.common.study_keys import CERTIFICATES, of_keys, prepare, with_certificates
 from service.jobs.kind_registry import Flag, Json, ReadSweep, StoredSweep
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue, Naming

@@ -7,10 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
-from service.jobs.common.proofs import CERTIFICATES, Certify, prepare, with_proofs
 from service.jobs.common.result_models import answered
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
-from service.jobs.common.study_keys import RangeRequest, law_issues, range_issues
+from service.jobs.common.study_keys import (
+    CERTIFICATES,
+    Certify,
+    RangeRequest,
+    law_issues,
+    prepare,
+    range_issues,
+    with_proofs,
+)
 from service.jobs.kind_registry import Flag
 from service.jobs.stored_figures import SweepRecord
 from service.jobs.study import Answer, Study, Watch

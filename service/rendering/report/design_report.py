@@ -1,19 +1,29 @@
-"""The report of a design: what was given, what came out, what holds it, how to have it again."""
+"""The reports of a design: what was given, what came out, what holds it, how to have it again.
+
+Of a robust design both optima, and what the uncertainty does.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
+from typing import Any
 
 import optim
-from optim.views.tables.design import design, front
+from optim.views.plots.figures import robust_figure
+from optim.views.tables.design import SIDE_LINES, design, effort_pairs, front, uncertain_rows
 from optim.views.tables.studies import shares
-from service.rendering.report.responses_report import ReportLine, Sweeps, linear_lines
 from service.rendering.report.sections import (
+    DASHED,
     Designed,
     Json,
+    ReportLine,
+    Sweeps,
     again_section,
     branch_table,
     by_path,
+    in_scenario,
+    linear_lines,
     motion_section,
     optimum_section,
     plan_section,
@@ -22,10 +32,12 @@ from service.rendering.report.sections import (
     title_section,
     violation_pair,
 )
+from solver.continuation.branch import AnyBranch
 from solver.errors import SolverError
+from solver.results import units
 from solver.scene.scene import Scene
 from solver.views.plots import style
-from solver.views.plots.html import block_html, image, page, pairs
+from solver.views.plots.html import block_html, image, page, pairs, table
 
 _MOST_PARAMETERS = 8
 
@@ -121,3 +133,117 @@ def _trade_off(result: Json) -> list[str]:
 
     words = "The front of peak against band, and the frequencies at risk"
     return ["<h2>Trade-off</h2>", image(pareto_figure(result), words), block_html(next(front(result)))]
+
+
+_COUNTS = 1e-6  # multipliers below this hold nothing
+_COLORS = {"nominal": style.SKY, "robust": style.VERMILION}
+
+
+def robust_report(given: Designed) -> str:
+    """The report as a page of HTML.
+
+    Parameters
+    ----------
+    given : what was designed; its result is that of `optim.robust_design`.
+
+    Raises
+    ------
+    SettingError, SceneError
+        The optimum does not fit the scene.
+    """
+    found = given.result
+    optimum = by_path(found["optimum"])
+    sweeps = Sweeps(harmonics=given.harmonics, limit=given.problem.get("limit"))
+    case = sweeps.governing(given.scene, given.problem, optimum)
+    scene = case.scene
+    after = scene.with_values(optimum)
+    linear, lines = linear_lines(after, tuple(optimum)), _lines(scene, found, sweeps)
+    words = (
+        f"Amplitude, {scene.measured.name}, over frequency: as given, and both optima with nothing uncertain"
+    )
+    if any("worst" in line.name for line in lines):
+        words += " and in the scenario that is worst for each"
+    words += case.where
+    shown = _shown(lines)
+    title = f"Robust damper of {given.scene.name}"
+    parts = [
+        title_section(given, title, found["status"]),
+        optimum_section(given, {f"{name} optimum": side["values"] for name, side in _sides(found)}),
+        _uncertain(found),
+        _over_the_uncertainty(found),
+        f"<h2>Responses</h2>{branch_table(lines)}",
+        response_section(scene, [*linear, *lines], words),
+        _robust_holds(found),
+        motion_section(shown.branch, f"At the peak of the {shown.name}"),
+        scene_section(given.scene),
+        plan_section(after, given.harmonics),
+        again_section(given, "design"),
+    ]
+    return page(title, "\n".join(parts))
+
+
+def _sides(found: Json) -> list[tuple[str, Json]]:
+    return [(name, found[name]) for name in ("nominal", "robust") if found[name] is not None]
+
+
+def _lines(scene: Scene, found: Json, sweeps: Sweeps) -> list[ReportLine]:
+    """As given, and each optimum with nothing uncertain and in its worst scenario."""
+    lines = [ReportLine(name="as given", branch=sweeps.of(scene), color=style.GREEN, width=1.0)]
+    for name, side in _sides(found):
+        here = scene.with_values(by_path(side["values"]))
+        color = _COLORS[name]
+        lines.append(ReportLine(name=f"{name} optimum", branch=sweeps.of(here), color=color, width=2.0))
+        if side["worst"] is not None:
+            worst = sweeps.worst(in_scenario(here, side["worst"]["scenario"]))
+            lines.append(
+                ReportLine(name=f"{name} optimum, worst case", branch=worst, color=color, dashes=DASHED)
+            )
+    return lines
+
+
+def _shown(lines: Sequence[ReportLine]) -> ReportLine:
+    """The last response of one sector: a mistuned disk has a loop in every sector, too many to look at."""
+    few = [line for line in lines if line.branch is None or not _written_out(line.branch)]
+    return (few or lines)[-1]
+
+
+def _written_out(branch: AnyBranch) -> bool:
+    """Whether a disk's sectors are contacts of their own."""
+    return any("@" in contact.name for contact in branch.scene.contacts)
+
+
+def _uncertain(found: Json) -> str:
+    """What is not known, and what is minimised over it."""
+    aim = found["aim"] if found["quantile"] is None else f"{100.0 * found['quantile']:g} % {found['aim']}"
+    return f"<h2>What is not known</h2>{pairs([*uncertain_rows(found['uncertain']), ('minimised', aim)])}"
+
+
+def _over_the_uncertainty(found: Json) -> str:
+    """Both optima over the uncertainty: numbers and picture."""
+    sides = _sides(found)
+    if not sides:
+        return ""
+    rows = [[name, *(show(side) for _, side in sides)] for name, show in SIDE_LINES]
+    numbers = table(["", *(f"{name} optimum" for name, _ in sides)], rows)
+    words = "Highest peak over the samples of the uncertainty, sorted, with the worst that was found"
+    picture = image(robust_figure(found), words, f"{words}.") if found["nominal"] is not None else ""
+    return f"<h2>Over the uncertainty</h2>{numbers}{picture}"
+
+
+def _robust_holds(found: Json) -> str:
+    """What holds the robust optimum, and how well the search closed."""
+    told = effort_pairs(found)
+    if found["violation"] is not None:
+        told.append(violation_pair(found["violation"]))
+    told.append(("search with nothing uncertain", found["nominal_status"]))
+    parts = ["<h2>What holds it</h2>", pairs(told)]
+    held = [cut for cut in found["cuts"] if abs(cut["multiplier"]) > _COUNTS]
+    if held:
+        rows: list[list[Any]] = [
+            [cut["scenario"]["words"], "" if cut["peak"] is None else units.length(cut["peak"]),
+             units.number(cut["multiplier"])]
+            for cut in held
+        ]  # fmt: skip
+        heads = ["scenario", "peak where it was found", "multiplier"]
+        parts.append(f"<h3>Scenarios that hold the robust optimum</h3>{table(heads, rows)}")
+    return "".join(parts)

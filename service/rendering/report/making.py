@@ -49,9 +49,8 @@ def report_of(given: Designed, form: str) -> bytes:
     SettingError, SceneError
         The optimum does not fit the scene.
     """
-    from service.rendering.report.design_report import design_report
+    from service.rendering.report.design_report import design_report, robust_report
     from service.rendering.report.identification import identification_report
-    from service.rendering.report.robust_report import robust_report
 
     if form == PDF:
         require_pdf()

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from service.cli.options import inputs
-from service.cli.options import shared as options
+from service.cli.options import parameters as options
 from service.errors import InputError
 from service.rendering.text import print_json, print_pairs
 from solver.errors import SettingError

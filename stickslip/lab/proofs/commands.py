@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from service.cli.failures import end
-from service.cli.options import shared as options
+from service.cli.options import parameters as options
 from service.errors import InputError
 from service.rendering.text import print_json, print_table
 from solver.errors import MissingExtraError

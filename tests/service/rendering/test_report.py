@@ -186,7 +186,7 @@ def test_a_report_of_several_cases_is_of_the_one_with_the_highest_peak() -> None
 
 
 def test_a_report_of_a_search_that_found_nothing_says_so() -> None:
-    from service.rendering.report.robust_report import robust_report
+    from service.rendering.report.design_report import robust_report
     from service.rendering.report.sections import Designed
 
     scene = solver.load_scene("two-dof")
@@ -198,9 +198,8 @@ def test_a_report_of_a_search_that_found_nothing_says_so() -> None:
 
 @pytest.mark.long
 def test_a_mistuned_robust_design_shows_its_worst_blade() -> None:
-    from service.rendering.report.responses_report import Sweeps, in_scenario
-    from service.rendering.report.robust_report import robust_report
-    from service.rendering.report.sections import Designed
+    from service.rendering.report.design_report import robust_report
+    from service.rendering.report.sections import Designed, Sweeps, in_scenario
 
     scene = solver.load_scene("bladed-disk")
     problem = {

@@ -118,7 +118,7 @@ def test_what_is_small(kind: str, scene: str, asked: dict[str, object], small: b
 def test_a_command_prepares_before_it_loads_a_kernel(folder: Path, arguments: str) -> None:
     code = (
         "import sys; from solver.jit import beside; beside.COMPILER = 'compiler';"
-        "from service.cli.app import run; sys.exit(run(sys.argv[1:]))"
+        "from service.cli.table import run; sys.exit(run(sys.argv[1:]))"
     )
     ran = subprocess.run(
         [sys.executable, "-c", code, *arguments.split(), "--harmonics", "1", "--json"], check=False,

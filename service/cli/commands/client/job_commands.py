@@ -13,7 +13,7 @@ import typer
 from service.cli.completion import SCENE_FILES
 from service.cli.failures import BAD_INPUT, FELL_SHORT
 from service.cli.options import inputs
-from service.cli.options import shared as options
+from service.cli.options import parameters as options
 from service.cli.options.inputs import amount, count
 from service.cli.options.problem_inputs import scene_to_submit, uploaded
 from service.cli.progress import bar

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from service.cli.commands.client.job_commands import MOST, listed, tell, tell_list
-from service.cli.options import shared as options
+from service.cli.options import parameters as options
 from service.cli.options.inputs import amount, count
 from service.errors import InputError
 from service.rendering.text import print_json, print_table, say

@@ -12,7 +12,7 @@ from typer.core import TyperCommand, TyperGroup
 from optim.problem.problem_keys import options as key_options_of
 from service.cli.commands.client.job_commands import hand_in, scene_of
 from service.cli.options import inputs, problem_inputs
-from service.cli.options import shared as options
+from service.cli.options import parameters as options
 from service.cli.options.key_options import (
     SCENE,
     KeyOption,

@@ -11,8 +11,7 @@ from optim.results.design_result import DesignStatus
 from optim.views.tables import design as designs
 from optim.views.tables import studies
 from service.cli import main
-from service.rendering.report.responses_report import ReportLine
-from service.rendering.report.sections import branch_table
+from service.rendering.report.sections import ReportLine, branch_table
 from service.rendering.text import print_told
 from solver.continuation.branch import uncertain
 from solver.results.notes import FLAGS, NONE_HIGHER, flag_words
