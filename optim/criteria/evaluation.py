@@ -12,7 +12,7 @@ from optim.problem.cases import LoadCase
 from optim.problem.design_problem import Problem
 from optim.problem.variables import parameter_values
 from solver.balance.balance import build
-from solver.balance.simplifications import Effects, even_harmonics_reason
+from solver.balance.simplifications import Effects
 from solver.continuation.branch import Branch
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
@@ -20,6 +20,7 @@ from solver.continuation.stretches import Course
 from solver.continuation.walk import ContinuationSettings
 from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene
+from solver.scene.scene_harmonics import even_harmonics_reason
 from solver.studies.peaks.seeds import fitted
 
 # A response that does not cover its range tells a design nothing; a usual one has 80 to 800 points.

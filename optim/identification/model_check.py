@@ -25,9 +25,10 @@ from optim.identification.fit import HUBER, LocalFit, Runs
 from optim.problem.variables import Real
 from solver.balance.balance import build
 from solver.balance.parameter_derivatives import reason_without
-from solver.balance.simplifications import Effects, even_harmonics_reason
+from solver.balance.simplifications import Effects
 from solver.scene.matrices_structure import MatricesStructure
 from solver.scene.scene import Scene
+from solver.scene.scene_harmonics import even_harmonics_reason
 from solver.scene.scene_records import Damper, Mass, Spring
 
 _LEVEL = 2.5e-3  # probability by which each test doubts a model that is right

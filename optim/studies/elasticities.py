@@ -25,7 +25,7 @@ from optim.results.studies_result import (
 )
 from solver.balance.parameter import resolve
 from solver.balance.parameter_derivatives import reason_without
-from solver.balance.simplifications import Effects, even_harmonics_reason
+from solver.balance.simplifications import Effects
 from solver.contacts.laws.load_harmonics import is_phase
 from solver.continuation.branch import Branch, BranchStatus, Peak
 from solver.continuation.branches.sweep import sweep
@@ -33,6 +33,7 @@ from solver.continuation.extrema.extrema import HALF_POWER
 from solver.jit.timer import clock
 from solver.scene.parameter_paths import PHASE
 from solver.scene.scene import Scene
+from solver.scene.scene_harmonics import even_harmonics_reason
 
 
 def sensitivities(

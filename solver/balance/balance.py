@@ -4,26 +4,39 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Annotated
+from functools import lru_cache
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from solver.balance.parameter import Kind, Parameter, check_fixed, resolve
-from solver.balance.simplifications import Effects, even_harmonics_reason
-from solver.balance.speed_line import numbers_along_line, speed_line
+from solver.balance.simplifications import Effects
+from solver.contacts.kernels import columns
+from solver.contacts.kernels.laws import law_number
 from solver.contacts.kernels.system import System
 from solver.errors import SettingError, check_count
 from solver.jit.fourier import Integer, Real
 from solver.jit.trig_polynomial import grid_size, grid_tables
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.condensation import reduce_model
-from solver.linear.contact_table import contact_set, highest_load, port_stiffnesses
-from solver.scene.bodies.kinematics import static_forces
+from solver.linear.model import LinearModel
+from solver.scene.bodies.body import REVOLUTIONS
 from solver.scene.cyclic.annulus import check_in_annulus, written_out
-from solver.scene.parameter_paths import AMPLITUDE
+from solver.scene.parameter_paths import AMPLITUDE, parameter_of
 from solver.scene.scene import Scene
-from solver.scene.scene_harmonics import MOST_HARMONICS, forced_harmonics, kept_harmonics
+from solver.scene.scene_harmonics import (
+    MOST_HARMONICS,
+    even_harmonics_reason,
+    forced_harmonics,
+    kept_harmonics,
+)
 from solver.wording import listing
+
+_AS_CALLED_FOR = Effects()
+_SINGLE = (
+    "must be finite here: contacts with kt = inf or kn = inf are for solve, sweep and march; elsewhere give "
+    "kt = 1e4 times the stiffness beside it"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,6 +44,7 @@ class Balance:
     """A scene with its harmonics and the parameter λ of a run."""
 
     scene: Annotated[Scene, "What is solved."]
+    model: Annotated[LinearModel, "Its linear part."]
     parameter: Annotated[Parameter, "What λ is; its unit inside is that of `Parameter.inside`."]
     system: Annotated[System, "The arrays the compiled loops work on."]
     n_harmonics: Annotated[
@@ -96,31 +110,28 @@ def build(
     SettingError
         Unknown path, a missing or bad frequency, or a bad number of harmonics.
     """
-    effects = effects or Effects()
-    whole = written_out(scene, every_sector=effects.every_sector)
-    if whole is not scene:
-        check_in_annulus(scene, path)
-    scene = whole
-    parameter = resolve(scene, path)
-    ks = _harmonics(scene, path, check_harmonics(harmonics), effects)
-    omega = 0.0
+    effects = effects or _AS_CALLED_FOR
+    if scene.structure.has_sectors:
+        whole = written_out(scene, every_sector=effects.every_sector)
+        if whole is not scene:
+            check_in_annulus(scene, path)
+        scene = whole
+    parameter, asked = resolve(scene, path), check_harmonics(harmonics)
+    odd = not effects.even_harmonics and even_harmonics_reason(scene, (path,)) is None
+    ks, omega = kept_harmonics(scene, (path,), asked, odd=odd), 0.0
     if parameter.kind is not Kind.FREQUENCY:
         hertz = check_fixed(path, frequency_hz)
         omega, scene = 2.0 * math.pi * hertz, scene.at_frequency(hertz)
     if parameter.kind is Kind.LEVEL:
         check_level(scene)
-    if parameter.kind is Kind.LEVEL and scene.value("excitation.amplitude") == 0.0:
-        scene = scene.with_values({"excitation.amplitude": 1.0})
-    system, sizes = _system(scene, parameter, ks, omega, effects, poles=poles)
+        if scene.level == 0.0:
+            scene = scene.with_values({AMPLITUDE: 1.0})
+    model = linear_model(scene)
+    system, sizes = _system(scene, model, parameter, ks, omega, effects, poles=poles)
     return Balance(
-        scene=scene, parameter=parameter, system=system, n_harmonics=harmonics, effects=effects, sizes=sizes
-    )
-
-
-def _harmonics(scene: Scene, path: str, highest: int, effects: Effects) -> Integer:
-    """Return the harmonics kept: all of them, or the odd ones where a symmetry makes the others zero."""
-    odd = not effects.even_harmonics and even_harmonics_reason(scene, (path,)) is None
-    return kept_harmonics(scene, (path,), highest, odd=odd)
+        scene=scene, model=model, parameter=parameter, system=system, n_harmonics=harmonics, effects=effects,
+        sizes=sizes,
+    )  # fmt: skip
 
 
 def for_parameter(balance: Balance, path: str, frequency_hz: float) -> Balance:
@@ -144,11 +155,13 @@ def for_parameter(balance: Balance, path: str, frequency_hz: float) -> Balance:
         raise SettingError("parameter", path, f"needs a balance with even harmonics: {reason}")
     sizes = balance.sizes
     if parameter.kind is Kind.STRUCTURE or balance.parameter.kind is Kind.STRUCTURE:
-        system, sizes = _system(balance.scene, parameter, balance.system.ks, omega, balance.effects)
+        system, sizes = _system(
+            balance.scene, balance.model, parameter, balance.system.ks, omega, balance.effects
+        )
     else:
         system = balance.system._replace(
             kind=parameter.code, active=parameter.active, omega=omega,
-            level_reference=_level(balance.scene), phase_reference=balance.scene.value("excitation.phase"),
+            level_reference=balance.scene.level or 1.0, phase_reference=balance.scene.phase,
         )  # fmt: skip
     return replace(balance, parameter=parameter, system=system, sizes=sizes)
 
@@ -169,7 +182,7 @@ def with_harmonics(balance: Balance, ks: Integer) -> Balance:
     system = balance.system
     at = np.searchsorted(system.ks, ks)
     highest = max(int(ks[-1]), int(system.load_ks[-1]))
-    cos_table, sin_table = grid_tables(grid_size(highest), highest)
+    cos_table, sin_table = tables_for(highest)
     rows = {name: getattr(system, name) for name in ("modal_forces", "forces")}
     rows = {name: np.ascontiguousarray(row[at]) if row.shape[0] else row for name, row in rows.items()}
     if system.dforces.size:
@@ -189,40 +202,43 @@ def check_level(scene: Scene) -> None:
 
 def level_scales_all(scene: Scene) -> bool:
     """Return whether the level of the excitation scales all constant forces, or none of them."""
-    return not (static_forces(scene) and any(force.harmonic == 0 for force in scene.excitation))
+    return not (scene.constant_forces and any(force.harmonic == 0 for force in scene.excitation))
 
 
-def _level(scene: Scene) -> float:
-    """Return the excitation amplitude the unit excitation stands for (1 where it is zero: nothing scales)."""
-    return scene.value("excitation.amplitude") or 1.0
+@lru_cache(maxsize=16)
+def tables_for(highest: int) -> tuple[Real, Real]:
+    """Return the tables of the event search for harmonics up to `highest`."""
+    return grid_tables(grid_size(highest), highest)
 
 
 def _system(
-    scene: Scene, parameter: Parameter, ks: Integer, omega: float, effects: Effects, *, poles: bool = True
+    scene: Scene, model: LinearModel, parameter: Parameter, ks: Integer, omega: float, effects: Effects, *,
+    poles: bool = True,
 ) -> tuple[System, Real]:  # fmt: skip
     """Put the arrays of the compiled loops together; with them what rounding is relative to."""
-    model = linear_model(scene)
     derivative = structure_derivative(scene, parameter.path) if parameter.kind is Kind.STRUCTURE else None
     if derivative is not None and derivative.contact_here is not None:
         wanted = "moves the contacts, which are followed in gradients and designs, not continued in"
         raise SettingError("parameter", parameter.path, wanted)
     reduced = reduce_model(
-        model, ks, port_stiffnesses(scene, model), derivative, whole_matrices=effects.whole_matrices,
-        each_port=effects.every_port, poles=poles,
+        model, ks, derivative, whole_matrices=effects.whole_matrices, each_port=effects.every_port,
+        poles=poles,
     )  # fmt: skip
-    load_order = highest_load(scene)
-    highest = max(int(ks[-1]), load_order)
-    cos_table, sin_table = grid_tables(grid_size(highest), highest)
-    line = speed_line(scene)
+    load_order = _highest_load(scene)
+    cos_table, sin_table = tables_for(max(int(ks[-1]), load_order))
+    line = _of_line(scene) if scene.speed_order is not None else _NO_LINE
+    rise = np.zeros((2, len(scene.contacts)))
+    for i, (_, first, second) in line.loads.items():
+        rise[:, i] = first, second
     system = System(
         ks=ks, load_ks=np.arange(load_order + 1, dtype=np.int64), which=reduced.which, cos_table=cos_table,
-        sin_table=sin_table, **contact_set(scene)._asdict(), contacts=numbers_along_line(scene, int(ks[-1])),
+        sin_table=sin_table, **_contact_set(scene), contacts=contact_rows(scene, int(ks[-1])),
         samples=0, condense=0 if effects.every_contact else 1,
         least_size=reduced.least_size,
-        active=parameter.active, load_rise=line.load_rise, level=line.level,
+        active=parameter.active, load_rise=rise, level=line.level,
         shift=reduced.shift, leading=reduced.leading, span=reduced.span, loose=reduced.loose, hold=0,
         kind=parameter.code, omega=omega,
-        level_reference=_level(scene), phase_reference=scene.value("excitation.phase"),
+        level_reference=scene.level or 1.0, phase_reference=scene.phase,
         centred=int(scene.observe.centred), only=scene.observe.harmonic or -1,
         haigh=np.zeros(4),
         parameter_reference=scene.value(parameter.path) if derivative is not None else 0.0,
@@ -231,9 +247,91 @@ def _system(
         observe_modes=reduced.observe_modes, modal_forces=reduced.modal_forces, K=reduced.K, C=reduced.C,
         M=reduced.M, dK=reduced.dK, dC=reduced.dC, dM=reduced.dM, ddK=reduced.ddK, L=reduced.L,
         observe=reduced.observe,
-        forces=reduced.forces, dforces=reduced.dforces, constant_mean=int(bool(static_forces(scene))),
+        forces=reduced.forces, dforces=reduced.dforces, constant_mean=int(bool(scene.constant_forces)),
     )  # fmt: skip
     return system, reduced.sizes
+
+
+def _contact_set(scene: Scene) -> dict[str, Any]:
+    """Return kernels and ports of all contacts, see `solver.contacts.kernels.system.System`.
+
+    A kernel that never ran in this process is loaded.
+    """
+    contacts, ports = scene.contacts, np.array(scene.port_counts, dtype=np.int64)
+    first = np.append(0, np.cumsum(ports))
+    rubs, normal, begins = np.zeros(first[-1], dtype=np.int64), [], first.tolist()
+    for contact, begin in zip(contacts, begins, strict=False):
+        rubs[[begin + port for port in contact.RUBBING]] = 1
+        normal.append(-1 if contact.normal_port is None else begin + contact.normal_port)
+    held = [tuple(port) for contact in contacts for port in contact.held]
+    return {
+        "laws": np.array([law_number(contact.kernel) for contact in contacts], dtype=np.int64),
+        "jenkins": np.array([contact.JENKINS for contact in contacts], dtype=np.int64),
+        "alone": np.array([contact.force_alone for contact in contacts], dtype=np.int64),
+        "normal_port": np.array(normal, dtype=np.int64), "first_port": first,
+        "first_block": np.append(0, np.cumsum(ports**2)), "owner": np.repeat(np.arange(ports.size), ports),
+        "rubs": rubs, "held": np.array(held, dtype=np.int64).reshape(-1, 3),
+    }  # fmt: skip
+
+
+def _highest_load(scene: Scene) -> int:
+    """Return the highest harmonic of the normal loads, 1 or more."""
+    loads = [contact.load for contact in scene.contacts]
+    return max([1, *(len(load.higher) + 1 for load in loads if load is not None)])
+
+
+def contact_rows(scene: Scene, highest: int) -> Real:
+    """Return the rows of the contact table, (n_contacts, ·), for harmonics up to `highest`.
+
+    A load that is not tied has a ratio NaN; one that follows the speed has its N0 at rest.
+
+    Raises
+    ------
+    SettingError
+        A contact is rigid: its events are followed, there is no balance of harmonics with it.
+    """
+    order = _highest_load(scene)
+    width = columns.COLUMNS if order == 1 else columns.wave_column(order + 1)
+    table = np.zeros((len(scene.contacts), width))
+    table[:, columns.RATIO] = math.nan
+    for row, contact in zip(table, scene.contacts, strict=True):
+        if contact.is_rigid:
+            key = "kt" if math.isinf(contact.stiffnesses[0]) else "kn"
+            raise SettingError(f"{contact.name}.{key}", math.inf, _SINGLE)
+        contact.fill(row, highest)
+    if scene.speed_order is not None:
+        for i, (at_rest, *_) in _of_line(scene).loads.items():
+            table[i, columns.N0] = at_rest
+    return table
+
+
+class _Line(NamedTuple):
+    """Polynomials of ω in place of numbers."""
+
+    loads: dict[int, list[float]]  # by the number of a contact whose N0 follows, by 1, ω and ω²
+    level: Real  # (2, 3) factors of the excitation and of constant forces by 1, ω and ω²
+
+
+_NO_LINE = _Line({}, np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
+
+
+def _of_line(scene: Scene) -> _Line:
+    """Return what follows the frequency along the engine-order line of a scene.
+
+    With speed = ω / (REVOLUTIONS · order) a polynomial of the speed is one of ω; centrifugal loads, written
+    at 1 rad/s, go with (ω / order)².
+    """
+    level, order, loads = _NO_LINE.level.copy(), scene.speed_order or 1.0, dict[int, list[float]]()
+    powers = (1.0 / (REVOLUTIONS * order)) ** np.arange(3)
+    for each in scene.with_speed:
+        found = np.array(each.coefficients) * powers
+        if each.path == AMPLITUDE:
+            level[0] = found / scene.level
+            continue
+        loads |= dict.fromkeys(parameter_of(scene, each.path).contacts, found.tolist())
+    if any(body.radius_of_rotation for body in scene.bodies):
+        level[1] = [0.0, 0.0, order**-2.0]
+    return _Line(loads, level)
 
 
 def contact_index(scene: Scene, contact: str) -> int:

@@ -25,8 +25,6 @@ import numpy as np
 from solver.balance.parameter import Kind
 from solver.contacts.kernels.system import DENSE, MODES, POLES, System
 from solver.jit.fourier import Complex, Flags, Integer, Real
-from solver.linear.assembly import linear_model
-from solver.linear.contact_table import port_stiffnesses
 
 if TYPE_CHECKING:
     from solver.balance.balance import Balance
@@ -74,8 +72,7 @@ class ClosedLoop:
         """Stiffness of the contacts while they stick, (nc, nc) [N/m]."""
         if self._like is not None:
             return self._like.held
-        kt = port_stiffnesses(self._balance.scene, linear_model(self._balance.scene))
-        return np.diag(kt).astype(np.complex128)
+        return np.diag(self._balance.model.port_stiffnesses).astype(np.complex128)
 
     @cached_property
     def free(self) -> Poles:
@@ -107,7 +104,7 @@ class ClosedLoop:
         """
         free, stuck = self.free, self.stuck
         half_width = np.minimum(free.half_width, stuck.half_width)
-        if not np.all(self.system.jenkins == 1) or linear_model(self._balance.scene).extra is not None:
+        if not np.all(self.system.jenkins == 1) or self._balance.model.extra is not None:
             return np.zeros_like(free.at), np.full_like(free.at, np.inf), half_width
         return free.at, np.maximum(stuck.at, free.at), half_width
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from solver.balance.kernels.residual import contact_values
 from solver.balance.parameter import Parameter
-from solver.contacts.kernels.laws import law_force, law_second
+from solver.contacts.kernels.laws import law_force, law_second, second_number
 from solver.contacts.kernels.stick_slip_events import FAILED, new_segments
 from solver.contacts.kernels.system import System
 from solver.contacts.laws.contact_law import without_second
@@ -117,6 +117,12 @@ def contact_forces(system: System, seconds: Integer, u: Real) -> ContactForces:
     return found
 
 
+def second_numbers(scene: Scene) -> Integer:
+    """Return the kernels of the second derivatives of all contacts, (n_contacts,), which all have some."""
+    kernels = [contact.second_kernel for contact in scene.contacts]
+    return np.array([second_number(kernel) for kernel in kernels if kernel is not None], dtype=np.int64)
+
+
 def check_laws(scene: Scene) -> None:
     """Raise SettingError if the law of a contact has no second derivatives."""
     others = without_second(scene.contacts)
@@ -130,6 +136,13 @@ def check_measure(scene: Scene) -> None:
     if scene.observe.centred:
         wanted = "is followed by sweeps, not by its peak: use `max_abs`"
         raise SettingError("observe.measure", scene.observe.measure, wanted)
+
+
+def check_no_line(scene: Scene) -> None:
+    """Raise SettingError where loads, forces or matrices follow the frequency along a line."""
+    if scene.speed_order is not None:
+        wanted = "must not be given: along an engine-order line responses and designs are found, no tracks"
+        raise SettingError("speed_order", scene.speed_order, wanted)
 
 
 def check_loads(system: System, parameters: Sequence[Parameter], slopes: Real) -> None:

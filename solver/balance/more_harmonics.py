@@ -7,12 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.balance.balance import Balance, build, with_harmonics
-from solver.balance.speed_line import numbers_along_line
+from solver.balance.balance import Balance, build, contact_rows, tables_for, with_harmonics
 from solver.contacts.kernels.columns import NODES
 from solver.contacts.kernels.system import DENSE, System
 from solver.jit.fourier import Complex, Integer, Real
-from solver.jit.trig_polynomial import grid_size, grid_tables
 from solver.scene.scene_harmonics import MULTIPLES, among, kept_harmonics, spread
 
 
@@ -26,9 +24,8 @@ def more_harmonics(balance: Balance, top: int, *, multiples: int = MULTIPLES) ->
     system = _extended(balance, ks)
     if system is None:
         return _rebuilt(balance, top)
-    highest = max(int(ks[-1]), 1)
-    cos_table, sin_table = grid_tables(grid_size(highest), highest)
-    contacts = numbers_along_line(balance.scene, int(ks[-1]))
+    cos_table, sin_table = tables_for(max(int(ks[-1]), 1))
+    contacts = contact_rows(balance.scene, int(ks[-1]))
     # Where a law is followed from node to node an estimate has to see what lies between them too.
     contacts[:, NODES] = np.maximum(contacts[:, NODES], 2.0 * balance.system.contacts[:, NODES])
     system = system._replace(cos_table=cos_table, sin_table=sin_table, contacts=contacts)

@@ -83,16 +83,16 @@ class Parameter:
 
 def resolve(scene: Scene, path: str) -> Parameter:
     """Return what `path` means in `scene`; SettingError with those that it has if it is none of them."""
-    scene.check_path(path)
     active = np.zeros(len(scene.contacts))
+    if path == FREQUENCY:
+        return Parameter(path=path, kind=Kind.FREQUENCY, active=active, unit="Hz", least=-math.inf)
+    scene.check_path(path)
     followed = follows_speed(scene, path)
     if followed is not None:
         raise SettingError("path", path, f"cannot be continued in: {followed} follows the speed")
     if path == SPEED and (scene.speed_order is not None or scene.with_speed):
         wanted = "is swept along an engine-order line (`speed_order`) alone where loads follow it"
         raise SettingError("path", path, wanted)
-    if path == FREQUENCY:
-        return Parameter(path=path, kind=Kind.FREQUENCY, active=active, unit="Hz", least=-math.inf)
     found = parameter_of(scene, path)
     if found.in_steps:
         raise SettingError("path", path, "must be a number that changes without steps: set it in the scene")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, cast
 
@@ -11,21 +11,20 @@ import numpy as np
 from solver.balance.balance import Balance, check_level
 from solver.balance.kernels.residual import contact_values
 from solver.balance.parameter import Kind, Parameter, resolve
-from solver.balance.simplifications import even_harmonics_reason
-from solver.balance.speed_line import check_given_loads
 from solver.contacts.kernels.laws import law_force
 from solver.contacts.kernels.system import MODES, Evaluation
+from solver.contacts.laws.load_harmonics import is_of_variation
 from solver.contacts.load_derivatives import load_slopes
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
-from solver.linear.assembly import linear_model, structure_derivative
+from solver.linear.assembly import structure_derivative
 from solver.linear.condensation import reduce_model, term_amplitudes
-from solver.linear.contact_table import port_stiffnesses
 from solver.linear.model import ExtraTerms, LinearModelDerivative
 from solver.scene.bodies.paths import FORCE
 from solver.scene.cyclic.annulus import check_in_annulus
-from solver.scene.parameter_paths import AMPLITUDE, parameter_of
+from solver.scene.parameter_paths import follows_speed, parameter_of
 from solver.scene.scene import MatricesStructure, Scene
+from solver.scene.scene_harmonics import even_harmonics_reason
 
 _SAME = 1e-12  # relative: less is rounding
 
@@ -33,7 +32,8 @@ _SAME = 1e-12  # relative: less is rounding
 def resolved(balance: Balance, paths: Sequence[str]) -> tuple[Parameter, ...]:
     """Return what paths mean; SettingError for one unknown, or that calls for harmonics left out."""
     scene, found = balance.scene, []
-    check_given_loads(scene, paths)
+    if scene.speed_order is not None:
+        _check_given_loads(scene, paths)
     for path in paths:
         parameter = resolve(scene, path)
         if parameter.kind is Kind.FREQUENCY:
@@ -45,6 +45,14 @@ def resolved(balance: Balance, paths: Sequence[str]) -> tuple[Parameter, ...]:
             raise SettingError("paths", path, f"needs a balance with even harmonics: {reason}")
         found.append(parameter)
     return tuple(found)
+
+
+def _check_given_loads(scene: Scene, paths: Iterable[str]) -> None:
+    """Raise SettingError where a path is of a load that follows the frequency with its contact's N0."""
+    for path in paths:
+        owner, _, key = path.rpartition(".")
+        if is_of_variation(key) and follows_speed(scene, f"{owner}.N0") is not None:
+            raise SettingError("paths", path, f"must not be of a load that follows the speed ({owner}.N0)")
 
 
 def reason_without(scene: Scene, balance: Balance, path: str) -> str:
@@ -104,7 +112,7 @@ def force_along(
 def excitation_slopes(balance: Balance, parameters: Sequence[Parameter]) -> tuple[Real, Real]:
     """Return what a unit of each parameter gives all forces, as a share and as a phase, (n_paths,)."""
     kinds = [parameter.kind for parameter in parameters]
-    level = balance.scene.value(AMPLITUDE) or 1.0 if Kind.LEVEL in kinds else 1.0
+    level = balance.scene.level or 1.0 if Kind.LEVEL in kinds else 1.0
     return (
         np.array([1.0 / level if kind is Kind.LEVEL else 0.0 for kind in kinds]),
         np.array([1.0 if kind is Kind.FORCE_PHASE else 0.0 for kind in kinds]),
@@ -142,7 +150,7 @@ def modal_dampings(balance: Balance, parameters: Sequence[Parameter]) -> dict[in
     system, structure = balance.system, balance.scene.structure
     if not isinstance(structure, MatricesStructure) or system.form != MODES or system.shift.any():
         return {}
-    if balance.scene.bodies or linear_model(balance.scene).extra is not None:  # which have no such damping
+    if balance.scene.bodies or balance.model.extra is not None:  # which have no such damping
         return {}
     of = {
         i: parameter_of(balance.scene, p.path).slope().damping
@@ -165,9 +173,8 @@ def matrices_of_paths(
     structural = {i: p.path for i, p in enumerate(parameters) if p.kind is Kind.STRUCTURE}
     if not structural or (modal_dampings(balance, parameters) and not whole):
         return None
-    scene, ks = balance.scene, balance.system.ks
-    model = linear_model(scene)
-    dense = reduce_model(model, ks, port_stiffnesses(scene, model), whole_matrices=True)
+    scene, model, ks = balance.scene, balance.model, balance.system.ks
+    dense = reduce_model(model, ks, whole_matrices=True)
     diameters, moving, which = model.diameters(ks), ks > 0, dense.which
     moves, turn = moving[:, None, None], model.turns(diameters)[:, None, None]
     L, shift = dense.L[which], balance.system.shift

@@ -32,10 +32,8 @@ from solver.contacts.kernels.system import (
     receptance_by_value,
 )
 from solver.jit.fourier import Complex, Flags, Real
-from solver.linear.assembly import linear_model
 from solver.linear.condensation import force_amplitudes
 from solver.linear.kernels.receptance import excitation
-from solver.linear.modal import matrices_of
 from solver.matrices.normal_modes import hermitian, undamped_modes
 
 # What the entries of the matrices are off by, and sums of what cancels, found on random scenes.
@@ -258,8 +256,8 @@ def _undamped_modes(balance: Balance, i: int, low: float, high: float) -> _Undam
     contacts, pushed = _relative(system.contact_modes[s]), _relative(system.modal_forces[i])
     hardly = np.flatnonzero(none & (pushed != 0.0) & (np.abs(pushed) < _SURELY))
     if system.form == MODES and hardly.size:
-        model, k = linear_model(balance.scene), system.ks[i : i + 1]
-        held = matrices_of(model, model.diameters(k), k > 0)
+        model, k = balance.model, system.ks[i : i + 1]
+        held = model.matrices(model.diameters(k), k > 0)
         force = force_amplitudes(model, k)[0]
         sharp = _sharpened(hermitian(held.K[0]), held.M[0], natural[hardly], force)
         pushed[hardly] = sharp / np.abs(system.modal_forces[i]).max()
@@ -268,7 +266,7 @@ def _undamped_modes(balance: Balance, i: int, low: float, high: float) -> _Undam
 
 def _undamped_of_matrices(balance: Balance, i: int, low: float, high: float) -> _Undamped | None:
     """Return the same of matrices without any damping, whose bases do not move."""
-    system, s, model = balance.system, int(balance.system.which[i]), linear_model(balance.scene)
+    system, s, model = balance.system, int(balance.system.which[i]), balance.model
     free = model.free
     K, C, M = (each[s][np.ix_(free, free)] for each in (system.K, system.C, system.M))
     if model.line is not None or np.any(hermitian(C)) or np.any(K - hermitian(K)):

@@ -10,12 +10,9 @@ the cost of modes instead of matrices.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, fields
 
 from solver.errors import SettingError
-from solver.scene.parameter_paths import changed_quantities, changes_loads
-from solver.scene.scene import Scene
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,40 +63,3 @@ class Effects:
             if name not in known:
                 raise SettingError("effects", name, f"must be `auto`, `all`, or of {', '.join(known)}")
         return cls(**{name.replace("-", "_"): True for name in chosen})
-
-
-def even_harmonics_reason(scene: Scene, paths: Iterable[str] = ()) -> str | None:
-    """Return why even harmonics and the mean are needed, or None if the response has odd harmonics only.
-
-    Parameters
-    ----------
-    scene : what vibrates.
-    paths : parameters that will be changed or differentiated by; a load amplitude breaks the symmetry.
-    """
-    for contact in scene.contacts:
-        reason = contact.answers_unlike or contact.several_responses
-        if reason is not None:
-            return reason
-    for force in scene.forces:
-        if force.harmonic % 2 == 0:
-            kind = "static" if force.harmonic == 0 else f"of harmonic {force.harmonic}"
-            return f"the force on {force.place} is {kind}"
-    for path in paths:
-        if changes_loads(scene, path):
-            return f"{path} changes a constant force"
-        for quantity in changed_quantities(scene, path):
-            if quantity.unlike_half_waves:
-                return f"{path} {quantity.unlike_half_waves}"
-    return None
-
-
-def breaks_symmetry(scene: Scene, paths: Iterable[str] = ()) -> bool:
-    """Return whether a motion and its negative half a period later are not answered alike.
-
-    Without that a half-wave symmetric response is always one of the responses, if perhaps not the only one.
-    """
-    if any(contact.answers_unlike is not None for contact in scene.contacts):
-        return True
-    if any(force.harmonic % 2 == 0 for force in scene.forces):
-        return True
-    return any(quantity.breaks_symmetry for path in paths for quantity in changed_quantities(scene, path))

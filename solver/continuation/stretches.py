@@ -40,7 +40,7 @@ from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
 from solver.jit.timer import clock
 from solver.linear.kernels.receptance import receptance
-from solver.linear.modal import undamped_resonance
+from solver.linear.natural_frequencies import undamped_resonance
 from solver.results.told import Piece
 
 STIFFEST = 1e7

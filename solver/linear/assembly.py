@@ -10,32 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.errors import SettingError
-from solver.linear.extra_terms import (
-    Coordinates,
-    extra_slopes,
-    extra_terms,
-    own_terms,
-    terms_of_line,
-)
-from solver.linear.model import ForceTerm, Identity, LinearModel, LinearModelDerivative
+from solver.linear.extra_terms import extra_slopes, extra_terms, own_terms, terms_of_line
+from solver.linear.model import Coordinates, ForceTerm, Identity, LinearModel, LinearModelDerivative
 from solver.linear.moving_base import base_motions, derivative_with_base, with_base
-from solver.linear.sector_matrices import ProportionalDamping, sector_matrices
 from solver.linear.structure_matrices import (
+    Elements,
     Matrices,
-    elements_of,
+    ProportionalDamping,
     mass_of_bodies,
     matrices_of_elements,
+    sector_matrices,
     slopes_of_elements,
 )
 from solver.matrices.values import frozen
 from solver.scene.bodies.kinematics import Form, static
 from solver.scene.cyclic.annulus import written_out
 from solver.scene.parameter_paths import parameter_of
-from solver.scene.scene import (
-    Excitation,
-    MatricesStructure,
-    Scene,
-)
+from solver.scene.scene import CyclicStructure, Excitation, LumpedStructure, MatricesStructure, Scene
 from solver.wording import listing, nearest
 
 FloatArray = NDArray[np.float64]
@@ -52,9 +43,9 @@ def linear_model(scene: Scene) -> LinearModel:
 
 @lru_cache(maxsize=2)
 def _linear_model(of: Identity[Scene]) -> LinearModel:
-    scene = written_out(of.it)
-    model, base = _without_base(scene), base_motions(scene)
-    return with_base(model, scene, base) if base else model
+    scene = written_out(of.it) if of.it.structure.has_sectors else of.it
+    model = _without_base(scene)
+    return with_base(model, scene, base_motions(scene)) if scene.base_moves else model
 
 
 def structure_derivative(scene: Scene, path: str) -> LinearModelDerivative:
@@ -67,33 +58,49 @@ def structure_derivative(scene: Scene, path: str) -> LinearModelDerivative:
     SettingError
         The scene has no parameter of that path.
     """
-    found, base = _derivative_by(scene, path), base_motions(scene)
-    return derivative_with_base(found, _without_base(scene), base) if base else found
+    found = _derivative_by(scene, path)
+    if not scene.base_moves:
+        return found
+    return derivative_with_base(found, _without_base(scene), base_motions(scene))
 
 
 def _without_base(scene: Scene) -> LinearModel:
     """The same with forces alone."""
     structure, here = scene.structure, _coordinates(scene)
     terms: dict[str, Any] = {}
-    if isinstance(structure, MatricesStructure):
+    if not isinstance(structure, MatricesStructure):
+        terms = matrices_of_elements(elements_of(structure, here.dofs), scene.bodies)._asdict()
+    else:
         sector = sector_matrices(structure, scene.bodies, len(scene.points))
         terms["every_diameter"] = sector.every_diameter
         if structure.has_sectors:
             terms |= _in_matrices(*(_nothing(0),) * 3) | {"sector": sector}
         else:
             terms |= _in_matrices(*sector.at(0))
-    else:
-        terms |= matrices_of_elements(
-            elements_of(structure, scene.bodies, scene.points), scene.bodies
-        )._asdict()
+    if scene.couplings or scene.aerodynamics or structure.loss_factor or here.own:
+        terms["extra"] = extra_terms(scene, here)
+    if scene.couplings:
+        terms["points"] = len(scene.points)
+    if scene.speed_order is not None:
+        terms |= {"line": terms_of_line(scene, here), "line_order": scene.speed_order}
     motions, beyond = _motions(here, scene.forms)
     return LinearModel(
         **terms, dofs=here.dofs, shapes=here.shapes, contact_here=motions, contact_next=beyond,
+        stiffnesses=np.array([k for contact in scene.contacts for k in contact.stiffnesses], np.float64),
         forces=_force_terms(here, scene.forces),
         observe=here.rows(row_of(scene, scene.observe.dof)), engine_order=scene.engine_order,
-        points=len(scene.points), sectors=structure.sector_count, extra=extra_terms(scene, here),
-        line=None if scene.speed_order is None else terms_of_line(scene, here),
-        line_order=scene.speed_order or 1.0,
+        sectors=structure.sector_count,
+    )  # fmt: skip
+
+
+def elements_of(structure: LumpedStructure | CyclicStructure, dofs: tuple[str, ...]) -> Elements:
+    """Return what a structure consists of, with the DOFs of bodies and points behind its own."""
+    return Elements(
+        dofs=dofs, masses=tuple([mass.m for mass in structure.masses]),
+        springs=tuple([(spring.between, spring.k, spring.c) for spring in structure.springs]),
+        dampers=tuple([(damper.between, damper.c) for damper in structure.dampers]),
+        beta=structure.stiffness_proportional_damping,
+        ratios=structure.damping_ratio if isinstance(structure, LumpedStructure) else None,
     )  # fmt: skip
 
 
@@ -117,13 +124,14 @@ def row_of(scene: Scene, name: str) -> FloatArray:
     SettingError
         There is none of that name.
     """
+    dofs = scene.dofs
+    if name in dofs:
+        return _unit(dofs, name)
     terms = scene.seen(name)
     if terms is None:
-        known = (*scene.dofs, *(each.name for each in scene.recovery))
+        known = (*dofs, *(each.name for each in scene.recovery))
         raise SettingError("dof", name, f"must be one of {listing(known)}", nearest(str(name), known))
-    if terms == ((name, 1.0),):
-        return _unit(scene.dofs, name)
-    return _sum_of(scene.dofs, terms)
+    return _sum_of(dofs, terms)
 
 
 @lru_cache(maxsize=64)
@@ -145,7 +153,7 @@ def _force_terms(coordinates: Coordinates, forces: tuple[Excitation, ...]) -> tu
     return tuple(
         ForceTerm(vector=vector(e), amplitude=e.amplitude, phase=e.phase, harmonic=e.harmonic)
         for e in forces
-        if e.base is None
+        if e.dof or e.forces
     )
 
 
@@ -179,8 +187,7 @@ def _derivative_by(scene: Scene, path: str) -> LinearModelDerivative:
         sector = sector_matrices(structure, scene.bodies, len(scene.points))
         terms["sector"] = ProportionalDamping(sector=sector, which=slope.damping)
     if slope.parts and not isinstance(structure, MatricesStructure):
-        elements = elements_of(structure, scene.bodies, scene.points)
-        found, terms["affine"] = slopes_of_elements(elements, slope.parts)
+        found, terms["affine"] = slopes_of_elements(elements_of(structure, here.dofs), slope.parts)
         terms |= found._asdict()
     if slope.masses:
         terms["M"] = mass_of_bodies(n, scene.bodies, slope.masses, len(scene.points))

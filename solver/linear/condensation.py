@@ -4,12 +4,18 @@ Harmonic k of a travelling wave of engine order i has the interblade phase k·i�
 a Hermitian stiffness stands for the whole tuned annulus; any other structure is the case of one real
 structure for every harmonic. What does not depend on contacts and forces is found once for a structure and
 kept (`solver.linear.modal`).
+
+Where few modes, coordinates or bodies move many contacts, the motions of some ports lead: those of a rigid
+body's contacts follow from those of six of them, those of a structure with 40 modes from 40. With the rows of
+`leading` ports, L = P L_leading, the receptance of all is A = P Â Pᵀ: an identity, no approximation (an
+interpolative decomposition: Cheng, Gimbutas, Martinsson, Rokhlin, SIAM J. Sci. Comput. 26 (2005) 1389,
+doi:10.1137/030602678).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,25 +24,19 @@ from solver.contacts.kernels.system import DENSE
 from solver.jit import eigen
 from solver.jit.fourier import Complex, Flags, Integer, Real
 from solver.linear.assembly import linear_model
-from solver.linear.contact_table import port_stiffnesses
-from solver.linear.leading_ports import every_port, leading_ports
-from solver.linear.modal import (
-    Decomposition,
-    HeldMatrices,
-    decompose,
-    held_alone,
-    held_by,
-    matrices_of,
-    sizes_of,
-)
-from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative
+from solver.linear.modal import Decomposition, decompose, held_by, least_hold, sizes_of
+from solver.linear.model import ForceTerm, HeldMatrices, LinearModel, LinearModelDerivative
 from solver.matrices.normal_modes import hermitian, least_stiffness
 from solver.scene.scene import Scene
 
 HELD = 1e-7  # smallest squared pivot of the scaled K from which every part is held, without a closer look
+SINGULAR = 1e-9  # the same from which they count as held in place, not by a hair
 BY_CONTACTS = 1e-6  # largest stiffness of a loose part, relative to the contacts' stiffness against it
 CANCELLED_STIFFNESS = 1e-9  # and relative to the sum of what cancels in it: a file of ten digits leaves less
 ROUNDING = 1e-12  # of the contacts' stiffness: what the modes themselves leave
+FEWEST_PORTS = 8  # below, nothing is gained (measured)
+WORTHWHILE = 0.75  # of the ports: with more leading ones the larger matrices are not much dearer
+_LED = 1e-13  # of a column as long as 1: what is left of one that follows from others
 _UNTOUCHED = 1e-14  # put on the scaled stiffness: what neither springs nor contacts hold is no contact's part
 
 
@@ -116,7 +116,6 @@ class CondensedStructure:
 def reduce_model(
     model: LinearModel,
     ks: Integer,
-    kt: Real,
     derivative: LinearModelDerivative | None = None,
     *,
     whole_matrices: bool = False,
@@ -125,12 +124,12 @@ def reduce_model(
 ) -> CondensedStructure:
     """Bring a linear model into the form of the compiled loops.
 
+    Where contacts alone hold a part in place, the stiffnesses of their ports are taken as the shift.
+
     Parameters
     ----------
     model : the matrices of one sector, or of the whole structure.
     ks : (nk,) harmonics kept.
-    kt : (nc,) stiffness of every port of the contacts [N/m], used as the shift where contacts alone
-        hold a part in place.
     derivative : by the structural parameter that is continued in; then the dense form is kept.
     whole_matrices : keep the dense form whatever the damping is.
     each_port : keep every port, even where all follow from fewer.
@@ -144,11 +143,11 @@ def reduce_model(
     no_modes = model.prescribed > 0 or model.line is not None
     dense_asked = whole_matrices or derivative is not None or no_modes
     apart = dense_asked or (model.extra is not None and not model.extra.is_real)
-    forces = force_amplitudes(model, ks)
+    kt, forces = model.port_stiffnesses, force_amplitudes(model, ks)
     which, diameters, moving, L, held = _structures(model, ks, apart=apart)
     shift, nothing = np.zeros(kt.size), np.zeros((0, kt.size))
-    loose = _loose(model, held.K[which[0]], L[which[0]], kt) if 0 in ks else nothing
-    if len(loose) or not (model.prescribed or held_alone(held)):
+    loose = _loose(model, held, L[0], kt) if ks[0] == 0 else nothing  # the mean has the first structure
+    if len(loose) or not (model.prescribed or least_hold(held) > SINGULAR):
         # Also without a mean: of a light part A is 1/(m ω²) else, 1e9 times what its contacts let it move.
         shift, held = kt.copy(), held_by(held, L, kt)
     found = None if dense_asked else decompose(held, poles=poles)
@@ -164,10 +163,8 @@ def reduce_model(
         every = np.broadcast_to(np.eye(held.K.shape[1]), held.K.shape)
         modes["sizes"] = np.array([sizes_of(held, every)] * 2)
     else:
-        modes, least = (
-            _projected(found, L, model.observe, forces, which),
-            _least_size(found, L, forces, which),
-        )
+        modes = _projected(found, L, model.observe, forces, which)
+        least = _least_size(found, L, forces, which)
         seen = modes["contact_modes"], modes["contact_duals"]
         dense = {name: np.zeros((0,) * axes, np.complex128) for name, axes in _DENSE_AXES.items()}
     ports = every_port(kt.size) if each_port else leading_ports(*seen)
@@ -193,7 +190,7 @@ def _structures(
     else:
         found, which = np.unique(np.where(still, -1, diameters), return_inverse=True)
         diameters, moving = np.maximum(found, 0), found >= 0
-    return which, diameters, moving, model.ports_at(diameters), matrices_of(model, diameters, moving)
+    return which, diameters, moving, model.ports_at(diameters), model.matrices(diameters, moving)
 
 
 def _of_harmonics(
@@ -234,22 +231,24 @@ def loose_ports(scene: Scene) -> tuple[Real, Real]:
     See `solver.linear.condensation.loose_motions`; also where the balance has no means.
     """
     model = linear_model(scene)
-    kt = port_stiffnesses(scene, model)
-    static = matrices_of(model, np.zeros(1, np.int64), np.zeros(1, np.bool_))
-    return _loose(model, static.K[0], model.contact_here + model.contact_next, kt), kt
+    static = model.matrices(np.zeros(1, np.int64), np.zeros(1, np.bool_))
+    kt = model.port_stiffnesses
+    return _loose(model, static, model.contact_here + model.contact_next, kt), kt
 
 
 def contacts_hold(model: LinearModel) -> bool:
     """Return whether the structure alone does not hold every part against the first harmonic's motion."""
-    matrices = matrices_of(model, model.diameters(np.ones(1, np.int64)), np.ones(1, np.bool_))
-    return not (model.prescribed or held_alone(matrices))
+    matrices = model.matrices(model.diameters(np.ones(1, np.int64)), np.ones(1, np.bool_))
+    return not (model.prescribed or least_hold(matrices) > SINGULAR)
 
 
-def _loose(model: LinearModel, K: NDArray[Any], L: NDArray[Any], kt: Real) -> Real:
+def _loose(model: LinearModel, held: HeldMatrices, L: NDArray[Any], kt: Real) -> Real:
     """Return the rigid-body motions at the ports: of all coordinates but those of a base."""
-    if not model.prescribed:
-        return loose_motions(K, L, kt)
-    return loose_motions(K[model.free][:, model.free], L[:, model.free], kt)
+    if model.prescribed:
+        return loose_motions(held.K[0][model.free][:, model.free], L[:, model.free], kt)
+    if least_hold(held) > HELD:
+        return np.zeros((0, kt.size))
+    return loose_motions(held.K[0], L, kt)
 
 
 def force_amplitudes(model: LinearModel, ks: Integer) -> Complex:
@@ -348,3 +347,60 @@ def _dense(
         "dK": _contiguous(dK), "dC": _contiguous(moves * dC), "dM": _contiguous(moves * dM), "ddK": ddK,
         "L": _contiguous(L), "observe": _contiguous(model.observe), "forces": forces,
     }  # fmt: skip
+
+
+class LeadingPorts(NamedTuple):
+    """Which ports lead, and how the others follow.
+
+    Attributes
+    ----------
+    leading : (r,) numbers of ports.
+    span : (nc, r) the motion of every port as a sum of theirs; (nc, 0) if none follows from others.
+    """
+
+    leading: Integer
+    span: Real
+
+
+def every_port(count: int) -> LeadingPorts:
+    """Return the answer that no port follows from others."""
+    return LeadingPorts(np.arange(count, dtype=np.int64), np.zeros((count, 0)))
+
+
+def leading_ports(motions: Complex, duals: Complex) -> LeadingPorts:
+    """Return as few ports as all others follow from, or all if that saves little.
+
+    Parameters
+    ----------
+    motions, duals : (ns, nc, N) rows of the ports in the modes or coordinates of each structure, to and from.
+    """
+    nc = motions.shape[1]
+    if nc < FEWEST_PORTS:
+        return every_port(nc)
+    rows = _rows(motions, duals)
+    if rows.shape[1] == 0:
+        return every_port(nc)
+    import scipy.linalg as sla  # for many contacts alone: a small response does not load SciPy's packages
+
+    # Modes have sizes of their own: each counts as much as the others.
+    sizes = np.linalg.norm(rows, axis=0)
+    # One factor without exchanges first: of many modes the other would take ten times as long.
+    square = np.linalg.qr((rows[:, sizes > 0.0] / sizes[sizes > 0.0]).T, mode="r")
+    triangle, order = sla.qr(square, mode="r", pivoting=True)
+    left = np.sqrt(np.cumsum(triangle[::-1] ** 2, axis=0)[::-1].max(axis=1))
+    rank = int(np.count_nonzero(left > _LED * max(1.0, left[0])))
+    if rank > WORTHWHILE * nc:
+        return every_port(nc)
+    span = np.zeros((nc, rank))
+    span[order[:rank]] = np.eye(rank)
+    span[order[rank:]] = sla.solve_triangular(triangle[:rank, :rank], triangle[:rank, rank:]).T
+    return LeadingPorts(order[:rank].astype(np.int64), np.ascontiguousarray(span))
+
+
+def _rows(motions: Complex, duals: Complex) -> NDArray[np.float64]:
+    """Return the real rows of all ports, without those that repeat others' columns."""
+    parts = [motions] if np.array_equal(duals, motions.conj()) else [motions, duals]
+    wide = np.concatenate([each for part in parts for each in part], axis=1)
+    if not np.any(wide.imag):
+        return np.ascontiguousarray(wide.real)
+    return np.concatenate([wide.real, wide.imag], axis=1)

@@ -7,71 +7,21 @@ that is known.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.linear.model import ExtraTerms, Terms
+from solver.linear.model import Blocks, Coordinates, ExtraTerms, OwnTerms, Terms
 from solver.matrices.values import frozen
 from solver.scene.bodies.body import REVOLUTIONS
 from solver.scene.cyclic.sector_blocks import full_elimination
-from solver.scene.linear_terms import End, Entry
+from solver.scene.linear_terms import Entry
 from solver.scene.scene import MatricesStructure, Scene
 from solver.scene.scene_parameter import Slope
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-Blocks = tuple[tuple[int, Real], ...]  # offsets between sectors, and a matrix for each
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class OwnTerms:
-    """What a structure given by matrices has beside the symmetric ones, by offsets between sectors."""
-
-    skew: Annotated[tuple[Blocks, Blocks], "Antisymmetric parts of K and C."]
-    G: Annotated[Blocks, "Damping per speed."]
-    K_omega2: Annotated[Blocks, "Stiffness per squared speed."]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Coordinates:
-    """What extra terms are written in."""
-
-    dofs: Annotated[tuple[str, ...], "Names of the DOFs."]
-    shapes: Annotated[Real, "The DOFs in the coordinates of the matrices, (n_dofs, n)."]
-    direct: Annotated[bool, "Whether they are these coordinates themselves, as of a lumped structure."] = (
-        False
-    )
-    own: Annotated[
-        OwnTerms | None,
-        "What the structure's own coordinates, in front of those of bodies, have beside symmetric matrices.",
-    ] = None
-
-    def rows(self, selected: NDArray[Any]) -> NDArray[Any]:
-        """Return rows over the DOFs as rows over the coordinates; read-only."""
-        return selected if self.direct else frozen(selected @ self.shapes)
-
-    def at(self, end: End) -> Real:
-        """Return a DOF, or a sum of them or of rows of the matrices, as a row over the coordinates (n,)."""
-        if isinstance(end, str):
-            return np.asarray(self.shapes[self.dofs.index(end)])
-        if end.dofs is None:
-            return np.pad(end.factors, (0, self.shapes.shape[1] - end.factors.size))
-        return np.asarray(end.factors @ self.shapes[[self.dofs.index(dof) for dof in end.dofs]])
-
-    @property
-    def key(self) -> tuple[object, ...]:
-        """Tells equal ones apart from others: the objects are the same as long as the structure is."""
-        return id(self.shapes), id(self.own), self.dofs
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Coordinates) and self.key == other.key
-
-    def __hash__(self) -> int:
-        return hash(self.key)
 
 
 def own_terms(structure: MatricesStructure) -> OwnTerms | None:
@@ -108,16 +58,13 @@ def _blocks(structure: MatricesStructure, matrix: Real | None) -> Blocks:
     return (0, left.own), (1, left.next), (-1, left.last)
 
 
-def extra_terms(scene: Scene, coordinates: Coordinates) -> ExtraTerms | None:
-    """Return the extra terms of a scene; None if it has none.
+def extra_terms(scene: Scene, coordinates: Coordinates) -> ExtraTerms:
+    """Return the extra terms of a scene.
 
     The same object each time for the same parts, so that what follows from it can be kept.
     """
-    loss = scene.structure.loss_factor
-    if not (scene.couplings or scene.aerodynamics or loss or coordinates.own):
-        return None
     spin = (scene.speed or 0.0) * REVOLUTIONS
-    return _terms(scene.entries, loss, spin, coordinates)
+    return _terms(scene.entries, scene.structure.loss_factor, spin, coordinates)
 
 
 @lru_cache(maxsize=64)

@@ -1,14 +1,12 @@
 """Modes or poles of a structure, found once and kept.
 
-They depend on the matrices and the interblade phases alone. The matrices of a scene are the same arrays as
-long as its structure is the same (`solver.linear.assembly.linear_model`), so the identity of these read-only
-arrays is the key: changing contacts, forces or the observed DOF costs no decomposition.
+They depend on the matrices and the interblade phases alone (`solver.linear.model.HeldMatrices`): changing
+contacts, forces or the observed DOF costs no decomposition.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Annotated, Any
 
@@ -17,39 +15,19 @@ from numpy.typing import NDArray
 
 from solver.contacts.kernels.system import MODES, POLES
 from solver.jit import eigen
-from solver.jit.fourier import Complex, Flags, Integer, Real
-from solver.linear.assembly import linear_model
-from solver.linear.contact_table import port_stiffnesses
-from solver.linear.model import Identity, LinearModel
+from solver.jit.fourier import Complex, Real
+from solver.linear.model import HeldMatrices
 from solver.matrices.normal_modes import (
     UndampedModes,
     hermitian,
     least_stiffness,
     undamped_modes,
 )
-from solver.scene.scene import Scene
 
 CLASSICAL = 1e-11  # largest off-diagonal modal damping, relative to the diagonal, that counts as none
 ROUNDING = 4.0  # the same in units of what the modes lack in orthogonality
 SPAN_ERROR = 1e-11  # largest relative error of the pole form against the direct inverse
-SINGULAR = 1e-9  # smallest squared pivot of the scaled K that counts as held in place, not by a hair
 LEAST_POLE = 1e-25  # smallest |1/s| relative to the largest: below is rounding
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class HeldMatrices:
-    """Matrices at each nodal diameter, (ns, n, n) each, real where all phases are."""
-
-    K: NDArray[Any] = field(repr=False)
-    C: NDArray[Any] = field(repr=False)
-    M: NDArray[Any] = field(repr=False)
-    key: Annotated[tuple[object, ...], "Tells equal ones apart from others."]
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, HeldMatrices) and self.key == other.key
-
-    def __hash__(self) -> int:
-        return hash(self.key)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,46 +42,10 @@ class Decomposition:
     sizes: Annotated[Real, "Of what stands left and right, by K, C and M, as `sizes_of`, (2, 3, ns, nm)."]
 
 
-def matrices_of(model: LinearModel, diameters: Integer, moving: Flags) -> HeldMatrices:
-    """Return the matrices at each nodal diameter, of motions or (False) of what is at rest.
-
-    Raises
-    ------
-    SettingError
-        A reduced sector was not built for one of them.
-    """
-    arrays = (model.K0, model.Kp, model.C0, model.Cp, model.M)
-    parts: tuple[object, ...] = (model.sector,) if model.sector else tuple(map(Identity, arrays))
-    # Without extra terms what is at rest has the matrices of what moves.
-    still = () if model.extra is None else tuple(moving.tolist())
-    return _matrices(_ByParts(model, (*parts, model.sectors, model.extra)), tuple(diameters.tolist()), still)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _ByParts:
-    """A model as a key: equal to another with the same matrices, whatever its contacts and forces are."""
-
-    model: LinearModel = field(repr=False)
-    parts: tuple[object, ...]
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _ByParts) and self.parts == other.parts
-
-    def __hash__(self) -> int:
-        return hash(self.parts)
-
-
 @lru_cache(maxsize=32)
-def _matrices(of: _ByParts, diameters: tuple[int, ...], moving: tuple[bool, ...]) -> HeldMatrices:
-    given = np.array(diameters, dtype=np.int64)
-    moves = np.array(moving, np.bool_) if moving else np.ones(given.size, np.bool_)
-    return HeldMatrices(*of.model.at(given, moves), (of.parts, diameters, moving))
-
-
-@lru_cache(maxsize=32)
-def held_alone(held: HeldMatrices) -> bool:
-    """Return whether the static stiffness alone holds every part in place."""
-    return held.K.shape[1] == 0 or least_stiffness(held.K[0]) > SINGULAR
+def least_hold(held: HeldMatrices) -> float:
+    """Return by how much the stiffness of the first structure holds every part: `least_stiffness`, or 1."""
+    return least_stiffness(held.K[0]) if held.K.shape[1] else 1.0
 
 
 def held_by(held: HeldMatrices, L: Complex, kt: Real) -> HeldMatrices:
@@ -261,41 +203,3 @@ def _plain_poles(
         if np.abs(summed - direct).max() > SPAN_ERROR * np.abs(direct).max():
             return None
     return values, x, yh
-
-
-_NEAR = 0.02  # relative to a natural frequency
-
-
-def undamped_resonance(
-    scene: Scene, frequency_hz: float, harmonics: NDArray[np.int64], held: Real | None = None
-) -> bool:
-    """Return whether nothing damps the structure, and a harmonic is near one of its natural frequencies.
-
-    Those with all contacts open count, those with all of them stuck, and those of a motion: a gap or a
-    nonlinear spring holds more or less of it by the amplitude. Friction takes out power in proportion to the
-    amplitude, a resonance puts it in so too: above some force no amplitude balances them.
-
-    Parameters
-    ----------
-    harmonics : those kept.
-    held : what contacts hold each harmonic above 0 of their motions with [N/m], (nk, n_ports).
-    """
-    model = linear_model(scene)
-    ks = harmonics[harmonics > 0]
-    if model.prescribed:
-        return False
-    diameters, kt = model.diameters(ks), port_stiffnesses(scene, model)
-    matrices = model.at(diameters, np.ones(ks.size, np.bool_))
-    springs = np.stack([0.0 * kt, kt] if held is None else [0.0 * kt, kt, held[0]])
-    for i, (k, K, C, M, L) in enumerate(zip(ks.tolist(), *matrices, model.ports_at(diameters), strict=True)):
-        if np.any(hermitian(C)) or np.any(K - hermitian(K)):
-            return False
-        if held is not None:
-            springs[-1] = held[i]
-        for each in springs:
-            stiffness = K + L.conj().T @ (each[:, None] * L)
-            omega2 = undamped_modes(hermitian(stiffness), hermitian(M)).omega2
-            natural = np.sqrt(np.maximum(omega2, 0.0)) / (2.0 * math.pi)
-            if np.any(np.abs(k * frequency_hz - natural) <= _NEAR * natural):
-                return True
-    return False

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Annotated, Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.matrices.values import frozen
+from solver.scene.linear_terms import End
+
 FloatArray = NDArray[np.float64]
 Integer = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 Complex = NDArray[np.complex128]
+Blocks = tuple[tuple[int, FloatArray], ...]  # offsets between sectors, and a matrix for each
 
 _Kept = TypeVar("_Kept")
 
@@ -76,6 +81,53 @@ class ForceTerm:
     amplitude: Annotated[float, "Force [N]."]
     phase: Annotated[float, "Phase [rad]."]
     harmonic: Annotated[int, "Multiple of the excitation frequency; 0 is a static load."]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OwnTerms:
+    """What a structure given by matrices has beside the symmetric ones, by offsets between sectors."""
+
+    skew: Annotated[tuple[Blocks, Blocks], "Antisymmetric parts of K and C."]
+    G: Annotated[Blocks, "Damping per speed."]
+    K_omega2: Annotated[Blocks, "Stiffness per squared speed."]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Coordinates:
+    """What extra terms are written in."""
+
+    dofs: Annotated[tuple[str, ...], "Names of the DOFs."]
+    shapes: Annotated[FloatArray, "The DOFs in the coordinates of the matrices, (n_dofs, n)."]
+    direct: Annotated[bool, "Whether they are these coordinates themselves, as of a lumped structure."] = (
+        False
+    )
+    own: Annotated[
+        OwnTerms | None,
+        "What the structure's own coordinates, in front of those of bodies, have beside symmetric matrices.",
+    ] = None
+
+    def rows(self, selected: NDArray[Any]) -> NDArray[Any]:
+        """Return rows over the DOFs as rows over the coordinates; read-only."""
+        return selected if self.direct else frozen(selected @ self.shapes)
+
+    def at(self, end: End) -> FloatArray:
+        """Return a DOF, or a sum of them or of rows of the matrices, as a row over the coordinates (n,)."""
+        if isinstance(end, str):
+            return np.asarray(self.shapes[self.dofs.index(end)])
+        if end.dofs is None:
+            return np.pad(end.factors, (0, self.shapes.shape[1] - end.factors.size))
+        return np.asarray(end.factors @ self.shapes[[self.dofs.index(dof) for dof in end.dofs]])
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """Tells equal ones apart from others: the objects are the same as long as the structure is."""
+        return id(self.shapes), id(self.own), self.dofs
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Coordinates) and self.key == other.key
+
+    def __hash__(self) -> int:
+        return hash(self.key)
 
 
 class Source(Protocol):
@@ -216,9 +268,46 @@ class Terms:
         return K, C, M
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldMatrices:
+    """Matrices at each nodal diameter, (ns, n, n) each, real where all phases are."""
+
+    K: NDArray[Any] = field(repr=False)
+    C: NDArray[Any] = field(repr=False)
+    M: NDArray[Any] = field(repr=False)
+    key: Annotated[tuple[object, ...], "Tells equal ones apart from others."]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, HeldMatrices) and self.key == other.key
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _ByParts:
+    """A model as a key: equal to another with the same matrices, whatever its contacts and forces are."""
+
+    model: LinearModel = field(repr=False)
+    parts: tuple[object, ...]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _ByParts) and self.parts == other.parts
+
+    def __hash__(self) -> int:
+        return hash(self.parts)
+
+
+@lru_cache(maxsize=32)
+def _matrices(of: _ByParts, diameters: tuple[int, ...], moving: tuple[bool, ...]) -> HeldMatrices:
+    given = np.array(diameters, dtype=np.int64)
+    moves = np.array(moving, np.bool_) if moving else np.ones(given.size, np.bool_)
+    return HeldMatrices(*of.model.at(given, moves), (of.parts, diameters, moving))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinearModel(Terms):
-    """The structure without its contacts: its terms, and what acts on it, joins it and is seen of it."""
+    """What is linear of a scene: its terms, and what acts on it, joins it and is seen of it."""
 
     dofs: Annotated[tuple[str, ...], "Names of the DOFs."]
     shapes: Annotated[
@@ -231,6 +320,9 @@ class LinearModel(Terms):
         "L(theta) = contact_here + contact_next e^{j theta}, (n_ports, n); u = L x, x the coordinates.",
     ]
     contact_next: Annotated[FloatArray, "Its part in the next sector, (n_ports, n)."]
+    stiffnesses: Annotated[
+        FloatArray, "What holds each motion when the contact is closed and stuck [N/m], (n_ports,)."
+    ]
     forces: Annotated[tuple[ForceTerm, ...], "The excitation."]
     observe: Annotated[FloatArray, "Selects the observed DOF, (n,)."]
     engine_order: Annotated[int, "Engine order of the excitation, 0 if lumped."]
@@ -257,6 +349,12 @@ class LinearModel(Terms):
         return 2.0 * math.pi * self.engine_order / self.sectors
 
     @property
+    def port_stiffnesses(self) -> FloatArray:
+        """A finite stiffness > 0 of every port [N/m]: its own, or one of the size of the structure's."""
+        own, K = self.stiffnesses, self.K0 if self.sector is None else self.sector.at(self.engine_order)[0]
+        return np.where((own > 0.0) & np.isfinite(own), own, float(np.abs(K).max(initial=0.0)) or 1.0)
+
+    @property
     def free(self) -> Flags:
         """The coordinates that move freely, (n,): not the base nor what it drives, which have no inertia."""
         if not self.prescribed:
@@ -274,6 +372,23 @@ class LinearModel(Terms):
     def diameters(self, ks: Integer) -> Integer:
         """Return the nodal diameters that harmonics see, from 0 to sectors - 1."""
         return (ks * self.engine_order) % self.sectors
+
+    def matrices(self, diameters: Integer, moving: Flags) -> HeldMatrices:
+        """Return what `at` does, kept as long as the structure is the same.
+
+        The matrices of a scene are the same arrays as long as its structure is, so the identity of these
+        read-only arrays is the key: changing contacts, forces or the observed DOF makes none anew.
+
+        Raises
+        ------
+        SettingError
+            A reduced sector was not built for one of them.
+        """
+        arrays = (self.K0, self.Kp, self.C0, self.Cp, self.M)
+        parts: tuple[object, ...] = (self.sector,) if self.sector else tuple(map(Identity, arrays))
+        # Without extra terms what is at rest has the matrices of what moves.
+        still = () if self.extra is None else tuple(moving.tolist())
+        return _matrices(_ByParts(self, (*parts, self.sectors, self.extra)), tuple(diameters.tolist()), still)
 
     def inertia(self, diameters: Integer, ks: Integer) -> NDArray[Any]:
         """Return M of harmonics ks at their nodal diameters, (ns, n, n), with what follows the speed.

@@ -14,8 +14,7 @@ import numpy as np
 from solver.jit.fourier import Complex, Integer, Real
 from solver.linear.assembly import linear_model
 from solver.linear.model import Identity, LinearModel
-from solver.matrices.normal_modes import undamped_modes
-from solver.scene.cyclic.annulus import written_out
+from solver.matrices.normal_modes import hermitian, undamped_modes
 from solver.scene.scene import Scene
 
 RIGID = 1e6  # times the structure's stiffness: what a rigid contact counts as
@@ -63,16 +62,14 @@ def natural_frequencies(scene: Scene, *, stuck: bool, harmonic: int = 1) -> Real
         one is as stiff as rounding lets be told.
     harmonic : of the excitation; of a disk its nodal diameter depends on that.
     """
-    scene = written_out(scene)
     model = linear_model(scene)
     k = np.full(1, harmonic, np.int64)
     n = model.diameters(k)
     (K,), _, (M,) = model.at(n, k > 0)
     (L,) = model.ports_at(n)
     if stuck:
-        stiffness = np.array([k for contact in scene.contacts for k in contact.stiffnesses])
         rigid = RIGID * float(np.abs(np.diag(K)).max(initial=0.0))
-        K = K + L.conj().T @ (np.where(np.isinf(stiffness), rigid, stiffness)[:, None] * L)
+        K = K + L.conj().T @ (np.where(np.isinf(model.stiffnesses), rigid, model.stiffnesses)[:, None] * L)
     if model.line is not None:
         return _along_line(K, model, k)
     if model.extra is not None:
@@ -110,3 +107,41 @@ def _of_poles(K: Complex, C: Complex, M: Complex) -> Real:
     state = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ K, -inverse @ G]])
     turning = np.sort(np.linalg.eigvals(state).imag)
     return np.asarray(np.maximum(turning[n:], 0.0) / (2.0 * math.pi))
+
+
+_NEAR = 0.02  # relative to a natural frequency
+
+
+def undamped_resonance(
+    scene: Scene, frequency_hz: float, harmonics: Integer, held: Real | None = None
+) -> bool:
+    """Return whether nothing damps the structure, and a harmonic is near one of its natural frequencies.
+
+    Those with all contacts open count, those with all of them stuck, and those of a motion: a gap or a
+    nonlinear spring holds more or less of it by the amplitude. Friction takes out power in proportion to the
+    amplitude, a resonance puts it in so too: above some force no amplitude balances them.
+
+    Parameters
+    ----------
+    harmonics : those kept.
+    held : what contacts hold each harmonic above 0 of their motions with [N/m], (nk, n_ports).
+    """
+    model = linear_model(scene)
+    ks = harmonics[harmonics > 0]
+    if model.prescribed:
+        return False
+    diameters, kt = model.diameters(ks), model.port_stiffnesses
+    matrices = model.at(diameters, np.ones(ks.size, np.bool_))
+    springs = np.stack([0.0 * kt, kt] if held is None else [0.0 * kt, kt, held[0]])
+    for i, (k, K, C, M, L) in enumerate(zip(ks.tolist(), *matrices, model.ports_at(diameters), strict=True)):
+        if np.any(hermitian(C)) or np.any(K - hermitian(K)):
+            return False
+        if held is not None:
+            springs[-1] = held[i]
+        for each in springs:
+            stiffness = K + L.conj().T @ (each[:, None] * L)
+            omega2 = undamped_modes(hermitian(stiffness), hermitian(M)).omega2
+            natural = np.sqrt(np.maximum(omega2, 0.0)) / (2.0 * math.pi)
+            if np.any(np.abs(k * frequency_hz - natural) <= _NEAR * natural):
+                return True
+    return False

@@ -1,26 +1,31 @@
-"""The matrices of masses, springs and dashpots with their derivatives; damping ratios, inertia of bodies."""
+"""The matrices of a structure with its bodies, made when they are first used; their derivatives.
+
+Of masses, springs and dashpots they are one sum. Of a structure given by its matrices or modes they are told
+for each nodal diameter: a full sector has its high boundary eliminated
+(`solver.matrices.sectors.elimination`), a reduced one brings the matrices of each. That of n is the complex
+conjugate of that of sectors − n; a structure without sectors has the nodal diameter 0 alone.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.contacts.fields import End
+from solver.contacts.fields import Between, parse_end
 from solver.errors import SettingError
-from solver.matrices.normal_modes import undamped_modes
+from solver.matrices.normal_modes import hermitian, undamped_modes
 from solver.matrices.values import frozen
 from solver.scene.bodies.body import Body
-from solver.scene.bodies.kinematics import dof_names
-from solver.scene.matrices_structure import Ratios
-from solver.scene.scene_records import CyclicStructure, LumpedStructure
+from solver.scene.cyclic.sector_blocks import at_diameter, full_elimination
+from solver.scene.matrices_structure import MatricesStructure, Ratios
 
 FloatArray = NDArray[np.float64]
 _SAME = 1e-9  # relative distance of two squared frequencies below which their quotient is a derivative
-_Ends = tuple[End, End]
 
 
 class Elements(NamedTuple):
@@ -28,8 +33,8 @@ class Elements(NamedTuple):
 
     dofs: tuple[str, ...]
     masses: tuple[float, ...]  # of the first DOFs; the mass of a body is no point mass and stands apart
-    springs: tuple[tuple[_Ends, float, float], ...]  # with stiffness and dashpot
-    dampers: tuple[tuple[_Ends, float], ...]
+    springs: tuple[tuple[Between, float, float], ...]  # with stiffness and dashpot
+    dampers: tuple[tuple[Between, float], ...]
     beta: float
     ratios: Ratios | None
 
@@ -42,19 +47,6 @@ class Matrices(NamedTuple):
     Cp: FloatArray
     K0: FloatArray
     Kp: FloatArray
-
-
-def elements_of(
-    structure: LumpedStructure | CyclicStructure, bodies: tuple[Body, ...], points: tuple[str, ...] = ()
-) -> Elements:
-    """Return what a structure with bodies, and points without inertia behind them, consists of."""
-    return Elements(
-        dofs=(*dof_names(structure, bodies), *points), masses=tuple(mass.m for mass in structure.masses),
-        springs=tuple((spring.ends, spring.k, spring.c) for spring in structure.springs),
-        dampers=tuple((damper.ends, damper.c) for damper in structure.dampers),
-        beta=structure.stiffness_proportional_damping,
-        ratios=structure.damping_ratio if isinstance(structure, LumpedStructure) else None,
-    )  # fmt: skip
 
 
 def _assembled(elements: Elements) -> Matrices:
@@ -72,17 +64,18 @@ def _assembled(elements: Elements) -> Matrices:
     return Matrices(M, C0, Cp, K0, Kp)
 
 
-def _join(X0: FloatArray, Xp: FloatArray, ends: _Ends, value: float, index: dict[str, int]) -> None:
+def _join(X0: FloatArray, Xp: FloatArray, ends: Between, value: float, index: dict[str, int]) -> None:
     """Add one spring or dashpot between two ends to X0 + Xp e^{j theta} + Xp^T e^{-j theta}."""
-    here = [index[end.dof] for end in ends if end.dof is not None]
+    first, second = map(parse_end, ends)
+    here = [index[end.dof] for end in (first, second) if end.dof is not None]
     for i in here:
         X0[i, i] += value
     if len(here) < 2:
         return
     a, b = here
-    if ends[1].next:
+    if second.next:
         Xp[a, b] -= value
-    elif ends[0].next:
+    elif first.next:
         Xp[b, a] -= value
     else:
         X0[a, b] -= value
@@ -201,3 +194,114 @@ def block_diag(*blocks: NDArray[Any]) -> NDArray[Any]:
         out[row : row + block.shape[0], column : column + block.shape[1]] = block
         row, column = row + block.shape[0], column + block.shape[1]
     return out
+
+
+KCM = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
+_NO_PROPORTIONAL = {"stiffness_proportional_damping": 0.0, "mass_proportional_damping": 0.0}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SectorMatrices:
+    """The matrices of a structure with its bodies, and points without inertia, behind its coordinates."""
+
+    structure: Annotated[MatricesStructure, "One sector, or the whole."]
+    bodies: Annotated[tuple[Body, ...], "Of it."]
+    points: Annotated[int, "How many points."]
+    shapes: Annotated[
+        NDArray[np.float64], "The DOFs of structure and bodies in the coordinates, (n_dofs, n)."
+    ]
+
+    @property
+    def every_diameter(self) -> bool:
+        """Whether all nodal diameters are known."""
+        found = self.structure.diameters
+        return found is None or len(found.diameters) == self.structure.sector_count // 2 + 1
+
+    def at(self, diameter: int) -> KCM:
+        """K, C and M at a nodal diameter, their Hermitian parts, real where the phase is; read-only.
+
+        They are the same arrays each time, so that what follows from them can be kept.
+
+        Raises
+        ------
+        SettingError
+            The model was not reduced for this nodal diameter.
+        """
+        n, count = diameter % self.structure.sector_count, self.structure.sector_count
+        found = _with_damping(self.structure, self.bodies, self.points, min(n, count - n))
+        return found if 2 * n <= count else (found[0].conj(), found[1].conj(), found[2].conj())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ProportionalDamping:
+    """The derivatives by a proportional damping: C gains K or M of the structure, without its bodies."""
+
+    sector: SectorMatrices
+    which: Literal["K", "M"]
+
+    def at(self, diameter: int) -> KCM:
+        """Derivatives of K, C and M at a nodal diameter."""
+        found = self.sector.at(diameter)[0 if self.which == "K" else 2].copy()
+        found[len(found) - _behind(self.sector.bodies, self.sector.points) :] = 0.0
+        nothing = np.zeros_like(found)
+        return nothing, found, nothing
+
+
+def _behind(bodies: tuple[Body, ...], points: int) -> int:
+    """How many coordinates stand behind those of the structure."""
+    return sum(len(body.dofs) for body in bodies) + points
+
+
+@lru_cache(maxsize=16)
+def sector_matrices(
+    structure: MatricesStructure, bodies: tuple[Body, ...], points: int = 0
+) -> SectorMatrices:
+    """The matrices of a structure; the same object each time, so that what follows from them can be kept."""
+    rows = list(structure.dofs.rows)
+    if structure.modes is not None:
+        own = structure.modes.modes[rows]
+    else:
+        if structure.has_sectors and structure.diameters is None:
+            eliminated = full_elimination(structure)
+            rows = [eliminated.row(row) for row in rows]
+        own = np.zeros((len(rows), structure.n_coordinates))
+        own[np.arange(len(rows)), rows] = 1.0
+    shapes = frozen(block_diag(own, np.eye(_behind(bodies, points))))
+    return SectorMatrices(structure=structure, bodies=bodies, points=points, shapes=shapes)
+
+
+@lru_cache(maxsize=128)
+def _with_damping(structure: MatricesStructure, bodies: tuple[Body, ...], points: int, n: int) -> KCM:
+    own = structure.model_copy(update=_NO_PROPORTIONAL)
+    K, C, M = _at(own, bodies, points, n)
+    inner = slice(0, K.shape[0] - _behind(bodies, points))
+    if structure.stiffness_proportional_damping or structure.mass_proportional_damping:
+        C = C.copy()
+        C[inner, inner] += structure.stiffness_proportional_damping * K[inner, inner]
+        C[inner, inner] += structure.mass_proportional_damping * M[inner, inner]
+    return K, frozen(C), M
+
+
+@lru_cache(maxsize=128)
+def _at(structure: MatricesStructure, bodies: tuple[Body, ...], points: int, n: int) -> KCM:
+    """K, C and M without proportional damping."""
+    K, C, M = _own(structure, n)
+    if bodies or points:
+        still, behind = np.zeros((points, points)), np.zeros((_behind(bodies, points),) * 2)
+        K, C, M = (
+            block_diag(K, behind), block_diag(C, behind), block_diag(M, bodies_mass(0, bodies), still)
+        )  # fmt: skip
+    return frozen(K), frozen(C), frozen(M)
+
+
+def _own(structure: MatricesStructure, n: int) -> KCM:
+    """K, C and M of the structure alone, with its damping ratios."""
+    modes, ratio = structure.modes, structure.damping_ratio
+    if modes is not None:
+        ratios = modes.damping_ratio
+        if ratios is None:
+            ratios = ratio_of_modes(0.0 if ratio is None else ratio, modes.omega2.size)
+        return np.diag(modes.omega2), np.diag(2.0 * ratios * np.sqrt(modes.omega2)), np.eye(modes.omega2.size)
+    # What is unsymmetric is among the extra terms; rounding must not look like it.
+    K, C, M = (hermitian(matrix).copy() for matrix in at_diameter(structure, n))
+    return K, C if ratio is None else C + modal_damping(M, K, ratio), M

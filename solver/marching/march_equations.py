@@ -25,8 +25,8 @@ from solver.errors import SettingError
 from solver.marching.kernels import march_state as kernel
 from solver.marching.kernels.march_state import SparseRows, System, steady
 from solver.marching.march_base import with_base, with_sum
-from solver.scene.bodies.body import REVOLUTIONS, Body
-from solver.scene.bodies.kinematics import Form, dof_names, pair_form
+from solver.scene.bodies.body import REVOLUTIONS
+from solver.scene.bodies.kinematics import Form, pair_form
 from solver.scene.linear_terms import End, dofs_at
 from solver.scene.scene import LumpedStructure, MatricesStructure, Scene
 
@@ -195,13 +195,12 @@ class MarchEquations:
 _IN_TIME = "cannot be marched in time: it is a term of the frequency domain; give dashpots or damping ratios"
 
 
-def _matrices(structure: LumpedStructure, bodies: tuple[Body, ...]) -> tuple[Real, csr_array, csr_array]:
+def _matrices(structure: LumpedStructure, index: dict[str, int]) -> tuple[Real, csr_array, csr_array]:
     """Masses [kg] of the points, and damping and stiffness of a lumped structure with bodies."""
     M = np.array([mass.m for mass in structure.masses])
     k = np.array([spring.k for spring in structure.springs])
     c = np.array([spring.c for spring in structure.springs]) + structure.stiffness_proportional_damping * k
     dashpots = np.array([damper.c for damper in structure.dampers])
-    index = {dof: i for i, dof in enumerate(dof_names(structure, bodies))}
     springs = selection([pair_form(spring.between) for spring in structure.springs], index, len(index))
     dampers = selection([pair_form(damper.between) for damper in structure.dampers], index, len(index))
     K = springs.T @ diags_array(k) @ springs
@@ -222,11 +221,12 @@ def _equations(scene: Scene) -> tuple[csr_array, csr_array, csr_array, dict[str,
         return _of_matrices(scene, structure, inertias)
     if not isinstance(structure, LumpedStructure):
         raise SettingError("scene", scene.name, "must be written out as its annulus to be marched")
-    M, C, K = _matrices(structure, bodies)
+    every = (*structure.dofs, *(dof for body in bodies for dof in body.dofs))
+    index = {dof: i for i, dof in enumerate(every)}
+    M, C, K = _matrices(structure, index)
     inverse = diags_array(1.0 / M)
     if bodies:
         inverse = block_diag([inverse, *inertias], format="csr")
-    index = {dof: i for i, dof in enumerate(dof_names(structure, bodies))}
     return csr_array(inverse @ K), csr_array(inverse @ C), csr_array(inverse), index
 
 

@@ -25,7 +25,13 @@ from typing import Annotated, cast
 
 import numpy as np
 
-from solver.balance.contact_hessian import check_laws, check_loads, contact_forces
+from solver.balance.contact_hessian import (
+    check_laws,
+    check_loads,
+    check_no_line,
+    contact_forces,
+    second_numbers,
+)
 from solver.balance.parameter import Kind
 from solver.balance.parameter_derivatives import (
     HarmonicMatrices,
@@ -36,10 +42,8 @@ from solver.balance.parameter_derivatives import (
     matrices_of_paths,
     resolved,
 )
-from solver.balance.speed_line import check_no_line
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
-from solver.linear.contact_table import second_numbers
 from solver.linear.model import dynamic_stiffness
 from solver.modes.corrector import ModeState, scales
 from solver.modes.mode_equations import Equations, Evaluated

@@ -18,7 +18,6 @@ from solver.balance.simplifications import Effects
 from solver.contacts.kernels.system import DENSE, System, by_reference
 from solver.jit.fourier import Complex, Integer, Real, to_full
 from solver.jit.timer import clock
-from solver.linear.assembly import linear_model
 from solver.modes.corrector import Corrected, ModeState, scales
 from solver.modes.mode_curve import FollowedCurve
 from solver.modes.mode_equations import BESIDES, Equations
@@ -92,7 +91,7 @@ class Recorder:
         self._equations, self._turns = equations, turns
         self._force = phase_of(equations)
         self._system: System = by_reference(equations.balance.system)
-        model = linear_model(equations.balance.scene)
+        model = equations.balance.model
         self._shapes = np.asarray(model.shapes @ equations.structure.shapes, dtype=np.complex128)
 
     def of(self, point: Corrected) -> PointRecord:

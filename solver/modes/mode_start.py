@@ -10,7 +10,6 @@ import numpy as np
 from solver.balance.balance import Balance
 from solver.continuation.walk import Pace
 from solver.jit.fourier import Complex, Real, cosine_position
-from solver.linear.assembly import linear_model
 from solver.matrices.normal_modes import hermitian, undamped_modes
 from solver.modes.corrector import Corrected, ModeState, carried_anew, correct
 from solver.modes.mode_equations import Equations, step
@@ -61,7 +60,7 @@ def linear_modes(balance: Balance, slopes: Complex, omega: float = 1.0) -> list[
     numpy.linalg.LinAlgError
         The mass matrix is not positive definite.
     """
-    model = linear_model(balance.scene)
+    model = balance.model
     one = np.array([1], dtype=np.int64)
     diameters = model.diameters(one)
     (K,), (C,), (M,) = model.at(diameters, one > 0)
@@ -173,7 +172,7 @@ def coordinates_of(equations: Equations, mode: LinearMode) -> Complex:
     s = equations.structure
     if not s.is_diagonal:
         return mode.shape
-    model = linear_model(equations.balance.scene)
+    model = equations.balance.model
     one = np.array([1], dtype=np.int64)
     (M,) = model.plain(model.diameters(one))[2]
     return np.asarray(s.shapes[s.first].conj().T @ (M @ mode.shape))

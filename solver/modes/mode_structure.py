@@ -20,7 +20,6 @@ from solver.contacts.kernels.system import DENSE
 from solver.jit.fourier import Complex, Flags, Integer, Real
 from solver.linear.assembly import linear_model
 from solver.linear.condensation import reduce_model
-from solver.linear.contact_table import port_stiffnesses
 from solver.linear.model import dynamic_stiffness
 from solver.matrices.normal_modes import hermitian, undamped_modes
 from solver.modes.kernels.mode_assembly import fill_stiffness, invert_modes
@@ -199,7 +198,7 @@ def structure_of(balance: Balance, alone: Complex | None = None) -> ModeStructur
         contact, back = system.contact_modes[which][:, led], system.contact_duals[which][:, led]
         forces, observe = system.modal_forces, system.observe_modes[which]
         model = linear_model(scene)
-        shapes = reduce_model(model, ks, port_stiffnesses(scene, model)).shapes[which]
+        shapes = reduce_model(model, ks).shapes[which]
         modes = carried = np.eye(values.shape[1], dtype=np.complex128)
         sizes = np.abs(values[first].real)
         squares = np.maximum(sizes, 1e-12 * sizes.max(initial=1.0))
@@ -217,7 +216,7 @@ def structure_of(balance: Balance, alone: Complex | None = None) -> ModeStructur
 
 def _on_one_mode(balance: Balance, mass: Complex, first: int, alone: Complex) -> Complex:
     """Return (M φ)(M φ)ᴴ of every harmonic, (nk, N, N): in a disk of those that are waves of φ's diameter."""
-    model, ks = linear_model(balance.scene), balance.system.ks
+    model, ks = balance.model, balance.system.ks
     diameters = np.asarray(model.diameters(ks)) % model.sectors
     pushed = mass[first] @ alone
     matrix, fed = np.outer(pushed, pushed.conj()), np.zeros_like(mass)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from solver.balance.balance import Balance, build, check_harmonics
-from solver.balance.simplifications import Effects, even_harmonics_reason
+from solver.balance.simplifications import Effects
 from solver.errors import SettingError, check_count
 from solver.jit.fourier import Real
 from solver.jit.timer import clock
@@ -21,7 +21,7 @@ from solver.modes.mode_records import collect
 from solver.modes.mode_results import NonlinearMode
 from solver.modes.mode_start import LinearMode, begin, damped_mode, equilibrium, linear_modes, slopes_at_rest
 from solver.results.watch import shows_progress
-from solver.scene.cyclic.annulus import written_out
+from solver.scene.scene_harmonics import even_harmonics_reason
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -150,7 +150,7 @@ def _begin(equations: Equations, mode: int) -> tuple[LinearMode, Real, list[Line
 
 def check_mode(scene: Scene, mode: int) -> None:
     """Raise SettingError unless the structure has a mode of that number."""
-    most = int(np.count_nonzero(linear_model(written_out(scene)).free))
+    most = int(np.count_nonzero(linear_model(scene).free))
     whole = isinstance(mode, (int, np.integer)) and not isinstance(mode, bool)
     if not whole or not 1 <= mode <= most:
         wanted = f"must be a whole number from 1, the slowest, to {most}, as many as the structure has"

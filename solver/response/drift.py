@@ -27,8 +27,6 @@ from solver.contacts.laws.contact_parts import Slider
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Integer, Real
 from solver.jit.separate import apart
-from solver.linear.assembly import linear_model
-from solver.linear.contact_table import port_stiffnesses
 
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
@@ -254,7 +252,7 @@ def _dashpots(balance: Balance, ways: Real, omega: float) -> tuple[Real, Real, R
     """
     from solver.response.time_history import matrices
 
-    model = linear_model(balance.scene)
+    model = balance.model
     whole, _, ports = matrices(model, 0)
     C = model.plain(np.zeros(1, np.int64))[1][0]
     free = model.free
@@ -262,7 +260,7 @@ def _dashpots(balance: Balance, ways: Real, omega: float) -> tuple[Real, Real, R
         np.ascontiguousarray(each.real)
         for each in (whole[np.ix_(free, free)], C[np.ix_(free, free)], ports[:, free])
     )
-    kt = port_stiffnesses(balance.scene, model)
+    kt = model.port_stiffnesses
     held = K + L.T @ (kt[:, None] * L)
     moved = np.linalg.solve(held, L.T @ (kt * ways).T)
     slow = C @ moved * (omega / (2.0 * math.pi))

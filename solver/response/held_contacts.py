@@ -25,7 +25,6 @@ from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
 from solver.linear.condensation import CANCELLED_STIFFNESS
-from solver.linear.contact_table import port_counts
 from solver.linear.model import LinearModel, LinearModelDerivative
 from solver.matrices.normal_modes import least_stiffness
 from solver.response.contact_response import ContactResponse, ContactState
@@ -75,7 +74,7 @@ class HeldContact:
 
 def held_contacts(scene: Scene, contacts: Sequence[ContactResponse]) -> tuple[HeldContact, ...]:
     """Return what sticks all the time and can hold a force."""
-    begins = np.append(0, np.cumsum(port_counts(scene))).tolist()
+    begins = np.append(0, np.cumsum(scene.port_counts, dtype=np.int64)).tolist()
     return tuple(
         HeldContact(given=slider, found=response, number=number, begin=begins[number])
         for number, (contact, response) in enumerate(zip(scene.contacts, contacts, strict=True))

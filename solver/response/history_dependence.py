@@ -49,7 +49,6 @@ from solver.contacts.laws.contact_parts import Slider
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
-from solver.linear.contact_table import port_stiffnesses
 from solver.linear.model import LinearModel
 from solver.matrices.normal_modes import hermitian
 from solver.response.contact_response import ContactState
@@ -251,7 +250,7 @@ def _sticks_from_rest(solution: Solution, sticking: tuple[HeldContact, ...]) -> 
     model = linear_model(solution.scene)
     stiffness = np.zeros(model.contact_here.shape[0])
     for contact in sticking:
-        stiffness[contact.ports] = port_stiffnesses(solution.scene, model)[contact.ports]
+        stiffness[contact.ports] = model.port_stiffnesses[contact.ports]
     reach = _compliances(model, stiffness, [contact.ports for contact in sticking])
     if reach is None:
         return False

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from solver.balance.parameter import Kind
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
-from solver.linear.modal import SINGULAR
+from solver.linear.condensation import SINGULAR
 from solver.linear.model import Identity, LinearModel
 from solver.linear.natural_frequencies import LARGE, Resonances, resonances
 from solver.matrices.normal_modes import hermitian, least_stiffness, undamped_modes

@@ -27,7 +27,7 @@ from solver.jit.fourier import Real
 from solver.jit.timer import clock
 from solver.lab import from_lab
 from solver.linear.condensation import loose_ports
-from solver.linear.modal import undamped_resonance
+from solver.linear.natural_frequencies import undamped_resonance
 from solver.response.contact_response import contact_responses, flags_of
 from solver.response.history_dependence import has_another_solution, history_of
 from solver.response.plausibility import band_end_of

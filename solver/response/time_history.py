@@ -18,7 +18,6 @@ from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model, row_of
 from solver.linear.condensation import contacts_hold, force_amplitudes
-from solver.linear.contact_table import port_stiffnesses
 from solver.linear.model import LinearModel, dynamic_stiffness
 from solver.response.solution import Solution, check_converged
 from solver.results.told import Piece
@@ -94,7 +93,7 @@ def all_coordinates(solution: Solution, *, first: int = 0) -> Complex:
     forces = [fourier.to_complex(force)[first:] for c in solution.contacts for force in c.forces]
     friction = np.array(forces, dtype=np.complex128).reshape(len(forces), ks.size).T
     if solution.contacts:
-        kt = port_stiffnesses(solution.scene, model)
+        kt = model.port_stiffnesses
         slips = [fourier.to_complex(each)[first:] for c in solution.contacts for each in c.motions]
         held = np.flatnonzero((ks == 0) | contacts_hold(model))
         friction[held] -= kt * np.array(slips).T[held]

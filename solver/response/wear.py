@@ -30,7 +30,7 @@ from solver.balance.balance import Balance, build, contact_index, for_parameter
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.residual import contact_values, evaluate
 from solver.balance.parameter import Kind
-from solver.balance.simplifications import Effects, even_harmonics_reason
+from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import KT, MU, OMEGA
 from solver.contacts.kernels.stick_slip_events import AFTER_SLIP, LIFTING, SLIP, UNLOADED, largest
@@ -44,6 +44,7 @@ from solver.jit.trig_polynomial import grid_size, grid_tables, on_grid
 from solver.linear.kernels.receptance import receptance
 from solver.response.solution import Solution, check_converged
 from solver.results.told import Piece
+from solver.scene.scene_harmonics import even_harmonics_reason
 
 _ROUNDING = 1e-13  # of the terms of a sum that cancel
 

@@ -165,14 +165,13 @@ def excitation_parameter(scene: Scene, path: str) -> SceneParameter | None:
     forces = scene.excitation
     if path == AMPLITUDE:
         return SceneParameter(
-            get=lambda: forces[0].amplitude, with_value=lambda new: _scaled(forces, new), unit="N",
+            get=lambda: scene.level, with_value=lambda new: _scaled(forces, new), unit="N",
             acts_on=ActsOn.LEVEL,
         )  # fmt: skip
     if path == PHASE:
         return SceneParameter(
-            get=lambda: next((force.phase for force in forces if force.harmonic), 0.0),
-            with_value=lambda new: _shifted(forces, new), unit="rad", least=-math.inf,
-            acts_on=ActsOn.FORCE_PHASE,
+            get=lambda: scene.phase, with_value=lambda new: _shifted(forces, new), unit="rad",
+            least=-math.inf, acts_on=ActsOn.FORCE_PHASE,
         )  # fmt: skip
     return None
 

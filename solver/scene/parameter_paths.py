@@ -12,7 +12,6 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from solver.contacts.laws.contact_law import AnyContact
-from solver.contacts.laws.contact_parts import LawQuantity
 from solver.errors import SettingError
 from solver.results.units import number
 from solver.scene.bodies import paths as of_bodies
@@ -137,18 +136,6 @@ def parameter_of(scene: Scene, path: object) -> SceneParameter:
     if found is None:
         raise _unknown(scene, path)
     return found
-
-
-def changed_quantities(scene: Scene, path: str) -> tuple[LawQuantity, ...]:
-    """What a path changes in each contact it acts on; nothing of a path that is no contact's."""
-    found = find_parameter(scene, path)
-    return () if found is None else found.quantities
-
-
-def changes_loads(scene: Scene, path: str) -> bool:
-    """Whether constant forces depend on a path."""
-    found = find_parameter(scene, path)
-    return found is not None and found.pulls
 
 
 def follows_speed(scene: Scene, path: str) -> str | None:

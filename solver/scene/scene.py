@@ -272,7 +272,10 @@ class Scene(Part):
     @property
     def dofs(self) -> tuple[str, ...]:
         """Names of all degrees of freedom: of the structure, then of the bodies, then points of terms."""
-        return (*kinematics.dof_names(self.structure, self.bodies), *self.points)
+        own = tuple(self.structure.dofs)
+        if not self.bodies and not self.couplings:
+            return own
+        return (*own, *(dof for body in self.bodies for dof in body.dofs), *self.points)
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -282,12 +285,44 @@ class Scene(Part):
     @property
     def forms(self) -> tuple[tuple[Form, ...], ...]:
         """The relative motions of every contact as sums of DOFs."""
-        return kinematics.contact_forms(self)
+        return tuple(
+            tuple(map(kinematics.pair_form, contact.pairs))
+            if contact.motions is None and contact.at is None
+            else kinematics.forms_of(self, contact)
+            for contact in self.contacts
+        )
+
+    @property
+    def port_counts(self) -> tuple[int, ...]:
+        """How many relative motions the force of every contact depends on."""
+        return tuple(len(contact.end_keys) for contact in self.contacts)
+
+    @property
+    def constant_forces(self) -> tuple[Excitation, ...]:
+        """The constant forces of loads and of rotation, each on a DOF; along a line those at 1 rad/s."""
+        if not self.loads and self.speed is None and self.speed_order is None:
+            return ()
+        return kinematics.static_forces(self)
 
     @property
     def forces(self) -> tuple[Excitation, ...]:
-        """The excitation, and the constant forces of loads and of rotation, each on a DOF."""
-        return (*self.excitation, *kinematics.static_forces(self))
+        """The excitation, and the constant forces, each on a DOF."""
+        return (*self.excitation, *self.constant_forces)
+
+    @property
+    def base_moves(self) -> bool:
+        """Whether it is driven by a base that moves, not by forces alone."""
+        return any(force.ground or force.driven for force in self.excitation)
+
+    @property
+    def level(self) -> float:
+        """Value of ``excitation.amplitude``: the amplitude of the first force."""
+        return self.excitation[0].amplitude
+
+    @property
+    def phase(self) -> float:
+        """Value of ``excitation.phase``: that of the first force that is not static."""
+        return next((force.phase for force in self.excitation if force.harmonic), 0.0)
 
     @property
     def rigid_contact(self) -> AnyContact | None:

@@ -1,4 +1,8 @@
-"""Which harmonics a balance keeps: those up to the number asked for, and always those of forces and loads."""
+"""Which harmonics a balance keeps: those up to the number asked for, and always those of forces and loads.
+
+A scene whose loads are constant and whose forces have odd harmonics only responds with x(τ + π) = −x(τ) if no
+stiffness changes with the motion: even harmonics and mean are zero.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +12,9 @@ from functools import lru_cache
 import numpy as np
 
 from solver.jit.fourier import Flags, Integer, Real
-from solver.scene.parameter_paths import changed_quantities, changes_loads
+from solver.scene.parameter_paths import FREQUENCY, find_parameter
 from solver.scene.scene import Scene
+from solver.scene.scene_parameter import SceneParameter
 
 MOST_HARMONICS = 1000
 # A force of this harmonic or above is a fast wave of its own: it gets its multiples, as harmonic 1 does.
@@ -37,9 +42,8 @@ def kept_harmonics(
     multiples : most multiples of a fast wave.
     odd : the response is half-wave symmetric: its odd harmonics are enough.
     """
-    orders, waves = load_orders(scene, paths), frozenset(force.harmonic for force in scene.forces)
-    forced = _forced(scene, paths, orders, waves)
-    return _kept(forced, frozenset(orders), waves, highest, odd, multiples).copy()
+    forced, orders, waves = _forced(scene, _set(scene, paths))
+    return _kept(forced, orders, waves, highest, odd, multiples).copy()
 
 
 @lru_cache(maxsize=64)
@@ -64,23 +68,66 @@ def _kept(
 
 def forced_harmonics(scene: Scene, paths: Iterable[str] = ()) -> tuple[int, ...]:
     """Return the harmonics of the forces and of the normal loads that vary, ascending."""
+    return _forced(scene, _set(scene, paths))[0]
+
+
+def _set(scene: Scene, paths: Iterable[str]) -> list[SceneParameter]:
+    """Return what paths are in a scene; the frequency is nothing of it."""
+    found = (find_parameter(scene, path) for path in paths if path != FREQUENCY)
+    return [each for each in found if each is not None]
+
+
+def _forced(
+    scene: Scene, changed: list[SceneParameter]
+) -> tuple[tuple[int, ...], frozenset[int], frozenset[int]]:
+    """Return all that are forced, ascending, and those of loads that vary, or would, and of forces."""
     waves = frozenset(force.harmonic for force in scene.forces)
-    return _forced(scene, paths, load_orders(scene, paths), waves)
-
-
-def _forced(scene: Scene, paths: Iterable[str], orders: set[int], waves: frozenset[int]) -> tuple[int, ...]:
-    found = waves | orders | {scene.observe.harmonic or 0} - {0}
-    if orders or any(changes_loads(scene, path) for path in paths):
-        found |= {0}
-    return tuple(sorted(found))
-
-
-def load_orders(scene: Scene, paths: Iterable[str] = ()) -> set[int]:
-    """Return the harmonics of the normal loads that vary, or would along the paths."""
     loads = (contact.load for contact in scene.contacts)
-    found = {order for load in loads if load is not None for order in load.orders}
-    changed = (quantity for path in paths for quantity in changed_quantities(scene, path))
-    return found | {quantity.load_order for quantity in changed if quantity.varies_load}
+    orders = {order for load in loads if load is not None for order in load.orders}
+    orders |= {each.load_order for one in changed for each in one.quantities if each.varies_load}
+    found = waves | orders | {scene.observe.harmonic or 0} - {0}
+    if orders or any(one.pulls for one in changed):
+        found |= {0}
+    return tuple(sorted(found)), frozenset(orders), waves
+
+
+def even_harmonics_reason(scene: Scene, paths: Iterable[str] = ()) -> str | None:
+    """Return why even harmonics and the mean are needed, or None if the response has odd harmonics only.
+
+    Parameters
+    ----------
+    scene : what vibrates.
+    paths : parameters that will be changed or differentiated by; a load amplitude breaks the symmetry.
+    """
+    for contact in scene.contacts:
+        reason = contact.answers_unlike or contact.several_responses
+        if reason is not None:
+            return reason
+    for force in scene.forces:
+        if force.harmonic % 2 == 0:
+            kind = "static" if force.harmonic == 0 else f"of harmonic {force.harmonic}"
+            return f"the force on {force.place} is {kind}"
+    for path in paths:
+        for changed in _set(scene, (path,)):
+            if changed.pulls:
+                return f"{path} changes a constant force"
+            for quantity in changed.quantities:
+                if quantity.unlike_half_waves:
+                    return f"{path} {quantity.unlike_half_waves}"
+    return None
+
+
+def breaks_symmetry(scene: Scene, paths: Iterable[str] = ()) -> bool:
+    """Return whether a motion and its negative half a period later are not answered alike.
+
+    Without that a half-wave symmetric response is always one of the responses, if perhaps not the only one.
+    """
+    if any(contact.answers_unlike is not None for contact in scene.contacts):
+        return True
+    if any(force.harmonic % 2 == 0 for force in scene.forces):
+        return True
+    changed = (each for one in _set(scene, paths) for each in one.quantities)
+    return any(quantity.breaks_symmetry for quantity in changed)
 
 
 def is_fast(scene: Scene, ks: Integer) -> Flags:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from functools import reduce
 from operator import or_
-from typing import Annotated, Any, Literal, Self, cast
+from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
 from pydantic import (
     Discriminator,
@@ -137,6 +137,9 @@ class _Structure(Part):
 class LumpedStructure(_Structure):
     """A structure of point masses."""
 
+    has_sectors: ClassVar[bool] = False
+    sector_count: ClassVar[int] = 1
+
     kind: Literal["lumped"]
     damping_ratio: Annotated[
         Ratios | None,
@@ -144,22 +147,14 @@ class LumpedStructure(_Structure):
         "added to the rest; bodies have none.",
     ] = None
 
-    @property
-    def sector_count(self) -> int:
-        """1: it is no disk."""
-        return 1
-
-    @property
-    def has_sectors(self) -> bool:
-        """False: it is no disk."""
-        return False
-
 
 class CyclicStructure(_Structure):
     """One sector of a disk of `sectors` sectors; ``X@next`` is DOF X of the next one.
 
     The sectors are equal but for `mistuning`.
     """
+
+    has_sectors: ClassVar[bool] = True
 
     kind: Literal["cyclic"]
     sectors: Sectors
@@ -174,11 +169,6 @@ class CyclicStructure(_Structure):
     def sector_count(self) -> int:
         """Number of sectors."""
         return self.sectors
-
-    @property
-    def has_sectors(self) -> bool:
-        """True: it is one sector of a disk."""
-        return True
 
 
 Structure = LumpedStructure | CyclicStructure | MatricesStructure

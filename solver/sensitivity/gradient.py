@@ -20,7 +20,9 @@ from solver.balance.contact_hessian import (
     ContactForces,
     check_laws,
     check_loads,
+    check_no_line,
     contact_forces,
+    second_numbers,
 )
 from solver.balance.kernels.haigh import utilisation
 from solver.balance.kernels.jacobian import factorise, step_back, step_back_transposed
@@ -34,14 +36,12 @@ from solver.balance.parameter_derivatives import (
     modal_dampings,
     resolved,
 )
-from solver.balance.speed_line import check_no_line
 from solver.balance.whole_motion import Amplitudes, WholeMotion, times, whole_motion
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.system import FROM_REST, UTILISED, evaluation_by_value
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Integer, Real
-from solver.linear.contact_table import second_numbers
 from solver.results.told import Piece
 from solver.sensitivity.hessian import (
     Adjoint,

@@ -7,12 +7,10 @@ from typing import Annotated
 
 import numpy as np
 
-from solver.balance.simplifications import even_harmonics_reason
-from solver.linear.contact_table import port_counts
-from solver.linear.leading_ports import FEWEST_PORTS, WORTHWHILE
+from solver.linear.condensation import FEWEST_PORTS, WORTHWHILE
 from solver.scene.cyclic.annulus import sectors_needed
 from solver.scene.scene import Scene
-from solver.scene.scene_harmonics import MULTIPLES, kept_harmonics
+from solver.scene.scene_harmonics import MULTIPLES, even_harmonics_reason, kept_harmonics
 from solver.scene.scene_records import MatricesStructure
 
 _REAL, _COMPLEX = 8, 16
@@ -66,7 +64,7 @@ def dense_bytes(scene: Scene, harmonics: int, *, every_sector: bool = False) -> 
     every_sector : whether all sectors of a disk are solved though one would stand for them.
     """
     sectors = _sectors(scene, every_sector)
-    n, ports = _dofs(scene) * sectors, int(port_counts(scene).sum()) * sectors
+    n, ports = _dofs(scene) * sectors, sum(scene.port_counts) * sectors
     odd = even_harmonics_reason(scene) is None
     beyond = harmonics + max(harmonics, _LEAST_BEYOND)
     kept = kept_harmonics(scene, (), harmonics, odd=odd)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from solver.balance.balance import Balance, build, fewer_harmonics
-from solver.balance.simplifications import Effects, even_harmonics_reason
+from solver.balance.simplifications import Effects
 from solver.contacts.kernels.system import (
     DENSE,
     MODES,
@@ -15,15 +15,15 @@ from solver.contacts.kernels.system import (
     receptance_by_value,
 )
 from solver.jit.fourier import Flags, Real
+from solver.linear.condensation import FEWEST_PORTS
 from solver.linear.kernels.receptance import PAIRS_UP_TO, receptance
-from solver.linear.leading_ports import FEWEST_PORTS
 from solver.response.plausibility import plausibility
 from solver.response.stability.cost import forecast
-from solver.scene.bodies.kinematics import static_forces
 from solver.scene.cyclic.annulus import sectors_needed
 from solver.scene.scene import (
     Scene,
 )
+from solver.scene.scene_harmonics import even_harmonics_reason
 from solver.scene.scene_records import MatricesStructure
 from solver.studies.memory import dense_bytes
 from solver.studies.study_results import Effect, Plan
@@ -134,7 +134,7 @@ def performance_curve_words(scene: Scene) -> str:
         return "no: a harmonic of the excitation other than the first drives no single mode"
     loads = [contact.load for contact in scene.contacts]
     tied = all(load is not None and load.in_proportion for load in loads)
-    grows = bool(loads) and tied and not static_forces(scene)
+    grows = bool(loads) and tied and not scene.constant_forces
     names = ",".join(f"{contact.name}.N0" for contact in scene.contacts)
     how = f"one curve for all values of `{names}` if laws scale" if grows else "one for each design"
     return (

@@ -15,7 +15,6 @@ from solver.balance.kernels.newton import newton
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import evaluation_by_value
 from solver.jit.fourier import Complex, Real, to_complex, to_full
-from solver.linear.assembly import linear_model
 from solver.linear.condensation import force_amplitudes
 from solver.linear.kernels.receptance import receptance
 from solver.linear.model import LinearModel
@@ -38,7 +37,7 @@ class PointSolver:
     def __init__(self, scene: Scene, harmonics: int) -> None:
         self.workspace = Workspace.of(build(scene, harmonics=harmonics))
         balance = self.workspace.balance
-        self.model: LinearModel = linear_model(balance.scene)
+        self.model: LinearModel = balance.model
         self.ks = balance.system.ks
         self.harmonics = harmonics
         self.solved = 0

@@ -17,7 +17,6 @@ from scipy import linalg
 
 from solver import Scene
 from solver.jit.fourier import Real
-from solver.linear.contact_table import port_stiffnesses
 from solver.linear.model import LinearModel
 from solver.response.time_history import matrices
 
@@ -135,7 +134,7 @@ def _thinned(hz: Real, gap: Real) -> Real:
 def true_response(scene: Scene, harmonics: int) -> Truth:
     """Peaks and points of the response over the scene's band."""
     solver = PointSolver(scene, harmonics)
-    kt = port_stiffnesses(solver.workspace.balance.scene, solver.model) if scene.contacts else np.zeros(0)
+    kt = solver.model.port_stiffnesses if scene.contacts else np.zeros(0)
     hz = grid(solver.model, kt, [int(k) for k in solver.ks], scene.observe.band)
     truth = Truth(solver=solver, hz=hz, amplitude=solver.amplitudes(hz))
     _drop_unsolved(truth)

@@ -10,7 +10,6 @@ from scipy.linalg import eigvalsh
 
 from solver import Scene, march, solve
 from solver.linear.assembly import linear_model
-from solver.linear.contact_table import port_stiffnesses
 from solver.studies.instant import start_of
 
 ROUNDING = 1e-12  # of two ways to add up a motion
@@ -99,7 +98,7 @@ def _frequency(rng: np.random.Generator, scene: Scene) -> float:
     """Near a resonance with the contacts free or stuck, near a fraction of one, or anywhere below."""
     model = linear_model(scene)
     L = np.real(model.contact_here)
-    kt = port_stiffnesses(scene, model) * (rng.random() < 0.5)
+    kt = model.port_stiffnesses * (rng.random() < 0.5)
     natural = np.sqrt(eigvalsh(model.K0 + L.T @ (kt[:, None] * L), model.M)) / (2.0 * math.pi)
     near = float(rng.choice(natural))
     frequencies = [rng.uniform(0.15, 1.5) * natural[0], near / rng.integers(2, 8), near, near]

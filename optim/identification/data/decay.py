@@ -39,9 +39,9 @@ from optim.identification.data.measured_table import Table, check_monotone
 from optim.identification.data.measured_units import Dimension
 from optim.identification.data.mode import SHARPER, WORDS, FollowedMode, checked_mode
 from optim.problem.variables import Real
-from solver.balance.simplifications import even_harmonics_reason
 from solver.modes.at_amplitudes import ModePoints
 from solver.scene.scene import Scene
+from solver.scene.scene_harmonics import even_harmonics_reason
 
 _BEGINS, _ENDS = 1.5, 20.0  # factors on the amplitudes measured between which the mode is looked at
 _STEP = 0.08  # of ln a between its points

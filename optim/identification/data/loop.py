@@ -23,7 +23,6 @@ from solver.balance.balance import build
 from solver.balance.simplifications import Effects
 from solver.jit import fourier
 from solver.jit.fourier import from_full, to_full
-from solver.linear.contact_table import port_counts
 from solver.scene.scene import Scene
 from solver.sensitivity.observed import LoopSensitivities
 
@@ -136,7 +135,7 @@ def read_loop(scene: Scene, table: Table) -> MeasuredRows:
         What is wrong, with its line.
     """
     table.need(FEWEST, "samples of one period")
-    counts = port_counts(scene).tolist()
+    counts = scene.port_counts
     names = [each.name for each, count in zip(scene.contacts, counts, strict=True) if count == 1]
     contact = table.words.get("contact", names[0] if len(names) == 1 else "")
     if contact not in names:

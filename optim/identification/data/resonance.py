@@ -25,10 +25,11 @@ from optim.identification.data.measured_units import Dimension
 from optim.identification.data.response import NOT_REACHED, measured_dof, observing_dof
 from optim.problem.variables import Real
 from solver.balance.balance import build
-from solver.balance.simplifications import Effects, even_harmonics_reason
+from solver.balance.simplifications import Effects
 from solver.continuation.branches.sweep import sweep
 from solver.scene.parameter_paths import AMPLITUDE
 from solver.scene.scene import Scene
+from solver.scene.scene_harmonics import even_harmonics_reason
 from solver.sensitivity.observed import TWO_PI, Observed, ObservedSensitivities, Quantity
 
 SHARPER = 0.1  # noise of a frequency relative to it, where that of an amplitude is 1

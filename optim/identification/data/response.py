@@ -22,12 +22,13 @@ from optim.identification.data.measured_units import Dimension
 from optim.problem.checks import DataError
 from optim.problem.variables import Real
 from solver.balance.balance import build
-from solver.balance.simplifications import Effects, even_harmonics_reason
+from solver.balance.simplifications import Effects
 from solver.continuation.branches.point_by_point import is_unique
 from solver.continuation.branches.sweep import sweep
 from solver.jit.fourier import Complex
 from solver.results.told import json_numbers
 from solver.scene.scene import Scene
+from solver.scene.scene_harmonics import even_harmonics_reason
 from solver.sensitivity.observed import TWO_PI, Observed, ObservedSensitivities, Quantity
 
 NOT_REACHED = -1

@@ -136,9 +136,8 @@ def _sectors(scene: Scene) -> int:
 
 
 def _motions(scene: Scene, sectors: int) -> int:
-    from solver.linear.contact_table import port_counts
 
-    return int(port_counts(scene).sum()) * sectors
+    return sum(scene.port_counts) * sectors
 
 
 def _unknown_issues(scene: Scene, harmonics: int, sectors: int) -> list[Issue]:

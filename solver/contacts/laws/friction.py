@@ -185,7 +185,7 @@ class FrictionContact(AnyContact):
         """Value of a parameter; of the load's amplitude whichever way it was given."""
         if key == "N1":
             return self.N1_value
-        if (order := order_of(key)) is not None:
+        if key not in self.PARAMETERS and (order := order_of(key)) is not None:
             given = next((each for each in self.higher_load or () if each.order == order), None)
             return 0.0 if given is None else given.phase if key.endswith("_phase") else given.amplitude
         if key != "N1_ratio":

@@ -26,7 +26,6 @@ from solver.continuation.stretches import Stretch, ending
 from solver.continuation.walk import Pace, walk
 from solver.jit.fourier import Real
 from solver.jit.timer import clock
-from solver.linear.assembly import linear_model
 
 TURN = 1e-6  # share of the range by which a branch has to turn back to be lost: less is a step over a kink
 # Steps, as shares of the range; the effort is how far the solution lies from the prediction, over `_OFF`.
@@ -43,7 +42,7 @@ def is_unique(balance: Balance) -> bool:
     system = balance.system
     if not all(contact.load_is_given for contact in balance.scene.contacts):
         return False
-    if not linear_model(balance.scene).is_symmetric:
+    if not balance.model.is_symmetric:
         return False
     if system.form == DENSE:
         return all(_dissipates(C) for C in system.C)

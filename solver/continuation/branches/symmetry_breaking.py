@@ -17,11 +17,10 @@ from dataclasses import replace
 import numpy as np
 
 from solver.balance.balance import Balance
-from solver.balance.simplifications import breaks_symmetry, even_harmonics_reason
 from solver.balance.workspace import PointSolution, Workspace
 from solver.jit.fourier import Integer, Real
 from solver.scene.cyclic.annulus import sectors_needed
-from solver.scene.scene_harmonics import places
+from solver.scene.scene_harmonics import breaks_symmetry, even_harmonics_reason, places
 
 SYMMETRIC_UNSTABLE = "symmetric_unstable"
 NOT_UNIQUE = "not_unique"

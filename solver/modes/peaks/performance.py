@@ -26,7 +26,6 @@ from solver.modes.mode_start import LinearMode, coordinates_of, linear_modes
 from solver.modes.nonlinear_mode import nonlinear_mode, pose
 from solver.results.base import Drawn
 from solver.results.views import Data, Views
-from solver.scene.bodies.kinematics import static_forces
 from solver.scene.scene import Scene
 
 _SAME = 1e-9  # relative difference of forces that are proportional
@@ -162,7 +161,7 @@ def with_loads(scene: Scene, factor: float) -> Scene:
 
 def grows_together(found: NonlinearMode) -> bool:
     """Return whether contact forces double where loads and motions do, at the last point of a mode."""
-    if static_forces(found.scene) or any(force.harmonic == 0 for force in found.scene.excitation):
+    if found.scene.constant_forces or any(force.harmonic == 0 for force in found.scene.excitation):
         return False
     state = found.points[-1]
     forces = []

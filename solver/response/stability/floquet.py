@@ -14,7 +14,6 @@ from solver.jit.fourier import Complex, Real
 from solver.jit.timer import clock
 from solver.lab import from_lab
 from solver.linear.assembly import linear_model
-from solver.linear.contact_table import port_counts
 from solver.linear.model import with_inertia
 from solver.response.solution import Solution, check_converged
 from solver.response.stability.monodromy import (
@@ -136,7 +135,7 @@ def scene_monodromy(
     model = linear_model(whole)
     free = model.free
     parts = _parts(scene, motions)
-    every = np.split(model.contact_here, np.cumsum(port_counts(whole)))[:-1]
+    every = np.split(model.contact_here, np.cumsum(whole.port_counts, dtype=np.int64))[:-1]
     elements = tuple(
         PeriodElement(ports=ports[list(part.ports)][:, free], pieces=part.pieces)
         for ports, contact in zip(every, whole.contacts, strict=True)

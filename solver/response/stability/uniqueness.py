@@ -40,7 +40,6 @@ from numpy.typing import NDArray
 from solver.contacts.laws.contact_law import AnyContact
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
-from solver.linear.contact_table import port_counts
 from solver.linear.model import LinearModel
 from solver.results.told import Piece
 from solver.scene.cyclic.annulus import annulus
@@ -156,7 +155,7 @@ def _largest(stacked: NDArray[Any]) -> NDArray[Any]:
 
 def _joined(scene: Scene, springs: list[tuple[Real, Real]]) -> tuple[Real, Real]:
     """Return the stiffnesses of all ports (n_ports,) and how what is left follows, (n_ports, n_ports)."""
-    ends = np.append(0, np.cumsum(port_counts(scene)))
+    ends = np.append(0, np.cumsum(scene.port_counts, dtype=np.int64))
     centre, rest = np.zeros(ends[-1]), np.zeros((ends[-1], ends[-1]))
     for i, (own, left) in enumerate(springs):
         place = slice(ends[i], ends[i + 1])

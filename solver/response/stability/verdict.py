@@ -14,7 +14,6 @@ from solver.continuation.branch import Branch, Peak
 from solver.errors import SettingError
 from solver.lab import LAB, from_lab, is_there
 from solver.linear.assembly import linear_model
-from solver.linear.contact_table import port_counts
 from solver.response.stability.cost import forecast
 from solver.response.stability.multipliers import verdict_of
 from solver.response.stability.uniqueness import MONOTONE, monotone
@@ -101,7 +100,7 @@ def _stable_beside(solution: Solution) -> str:
     if not is_there(f"{LAB}.all_solutions"):
         return ""
     solve_all = from_lab("all_solutions.all_solutions:solve_all")
-    unknowns = (2 * solution.n_harmonics + 1) * int(port_counts(solution.scene).sum())
+    unknowns = (2 * solution.n_harmonics + 1) * sum(solution.scene.port_counts)
     parts = iter(range(math.ceil(_PARTS * min((_UNKNOWNS / unknowns) ** 2, 1.0))))
     every = solve_all(
         solution.scene, frequency_hz=solution.frequency_hz, harmonics=solution.n_harmonics, starts=_STARTS,

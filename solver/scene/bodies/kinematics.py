@@ -16,39 +16,27 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from solver.contacts.fields import NEXT, Between, Vector, parse_end
-from solver.contacts.frames import cross, unit
+from solver.contacts.frames import Axes, cross, unit
 from solver.contacts.laws.contact_law import AnyContact
 from solver.scene.bodies.body import REVOLUTIONS, Body, Load, Node, Place
 from solver.scene.scene_parameter import Forces, Term
 from solver.scene.scene_parameter import Form as Form
-from solver.scene.scene_records import Excitation, LumpedStructure, Structure
+from solver.scene.scene_records import Excitation, LumpedStructure
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
 
-def dof_names(structure: Structure, bodies: tuple[Body, ...]) -> tuple[str, ...]:
-    """Names of all degrees of freedom: of the structure, then of the bodies."""
-    own = tuple(structure.dofs)
-    return own if not bodies else (*own, *(dof for body in bodies for dof in body.dofs))
-
-
-def contact_forms(scene: Scene) -> tuple[tuple[Form, ...], ...]:
-    """The relative motions of every contact."""
-    return tuple(forms_of(scene, contact) for contact in scene.contacts)
-
-
 def forms_of(scene: Scene, contact: AnyContact) -> tuple[Form, ...]:
-    """The relative motions of one contact, in the order its law has them."""
+    """The relative motions of a contact that is not between DOFs, in the order its law has them."""
     if contact.motions is not None:
         return tuple(_written(motion) for motion in contact.motions)
-    if contact.axes is None or contact.at is None:
-        return tuple(pair_form(pair) for pair in contact.pairs)
-    directions = tuple(contact.axes[which] for which in contact.directions)
-    return placed_forms(scene, contact.between, contact.at, directions, contact.spread)
+    axes, at = cast(Axes, contact.axes), cast(Vector, contact.at)
+    directions = tuple(axes[which] for which in contact.directions)
+    return placed_forms(scene, contact.between, at, directions, contact.spread)
 
 
 def placed_forms(
@@ -160,8 +148,6 @@ def written_form(form: Form) -> tuple[tuple[str, float], ...]:
 
 def static_forces(scene: Scene) -> tuple[Excitation, ...]:
     """The constant forces of loads and of rotation as forces on DOFs; along a line those at 1 rad/s."""
-    if not scene.loads and scene.speed is None and scene.speed_order is None:
-        return ()
     found = [part for load in scene.loads for part in towards(scene, load, load.force)]
     for body in scene.bodies:
         found += outward(body, body.mass * (body.radius_of_rotation or 0.0) * spin_of(scene) ** 2)

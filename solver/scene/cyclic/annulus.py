@@ -24,7 +24,7 @@ from solver.scene.cyclic.sector_blocks import (
     full_elimination,
 )
 from solver.scene.linear_terms import Coupling, LinearTerm
-from solver.scene.parameter_paths import changed_quantities
+from solver.scene.parameter_paths import find_parameter
 from solver.scene.scene import (
     AnyContact,
     Body,
@@ -175,7 +175,8 @@ def check_in_annulus(scene: Scene, path: str) -> None:
     the scene, there it stands for all sectors.
     """
     owner, _, key = path.rpartition(".")
-    amplitude = any(quantity.varies_load for quantity in changed_quantities(scene, path))
+    found = find_parameter(scene, path)
+    amplitude = found is not None and any(quantity.varies_load for quantity in found.quantities)
     if amplitude if _standing(scene) else owner != "structure" and is_phase(key):
         reason = sectors_needed(scene).reason
         raise SettingError(

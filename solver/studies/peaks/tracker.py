@@ -13,9 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.balance.contact_hessian import check_measure
+from solver.balance.contact_hessian import check_measure, check_no_line, second_numbers
 from solver.balance.simplifications import Effects
-from solver.balance.speed_line import check_no_line
 from solver.contacts.kernels.system import System, by_reference
 from solver.contacts.laws.contact_law import without_second
 from solver.continuation.branch import Peak
@@ -40,7 +39,6 @@ from solver.continuation.extrema.kernels.peak_state import (
 from solver.continuation.walk import Pace, walk
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
-from solver.linear.contact_table import second_numbers
 from solver.scene.scene import Scene
 from solver.studies.peaks.followed_peak import MOST_ROWS, FollowedPeak
 from solver.studies.peaks.seeds import (

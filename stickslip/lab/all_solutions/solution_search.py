@@ -19,7 +19,7 @@ from itertools import pairwise
 import numpy as np
 
 from solver.balance.balance import Balance
-from solver.balance.simplifications import breaks_symmetry
+from solver.scene.scene_harmonics import breaks_symmetry
 from solver.balance.workspace import PointSolution, Workspace
 from solver.continuation.branch import BranchStatus, Points
 from solver.continuation.branches.sweep import walk

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from solver.balance.speed_line import check_no_line
+from solver.balance.contact_hessian import check_no_line
 from solver.errors import SettingError
 from solver.jit.timer import clock
 from solver.jit.fourier import Real, cosine_position

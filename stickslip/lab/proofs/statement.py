@@ -13,7 +13,6 @@ from stickslip.lab.proofs.checker import System
 from solver.contacts.laws.contact_parts import Follows, Row
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
-from solver.linear.structure_matrices import elements_of
 from stickslip.lab.proofs.exact.flow import FlowPiece
 from stickslip.lab.proofs.exact.piecewise import MemberState, Piecewise
 from solver.contacts.pieces.line import FREE, STICK
@@ -45,16 +44,12 @@ def system_of(piecewise: Piecewise, frequency_hz: float | None) -> dict[str, Any
         and model.extra is None
         and not structure.damping_ratio
     ):
-        elements = elements_of(structure, ())
-        at = {dof: i for i, dof in enumerate(elements.dofs)}
-        springs = []
-        for ends, k, c in [*elements.springs, *((ends, 0.0, c) for ends, c in elements.dampers)]:
-            terms = [
-                [at[end.dof], sign]
-                for end, sign in zip(ends, (1.0, -1.0), strict=True)
-                if end.dof is not None
-            ]
-            springs.append([terms, terms, k, c + elements.beta * k])
+        at, springs = {dof: i for i, dof in enumerate(structure.dofs)}, []
+        numbers = [(x.k, x.c) for x in structure.springs] + [(0.0, x.c) for x in structure.dampers]
+        for part, (k, c) in zip((*structure.springs, *structure.dampers), numbers, strict=True):
+            ends = zip(part.ends, (1.0, -1.0), strict=True)
+            terms = [[at[end.dof], sign] for end, sign in ends if end.dof is not None]
+            springs.append([terms, terms, k, c + structure.stiffness_proportional_damping * k])
     if piecewise.mass_damping:
         gas = piecewise.mass_damping * M
         springs += [[[[i, 1.0]], [[k, 1.0]], 0.0, float(gas[i, k])] for i, k in np.argwhere(gas).tolist()]

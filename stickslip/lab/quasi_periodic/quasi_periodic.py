@@ -22,7 +22,7 @@ import numpy as np
 from solver.arrays import Real
 from solver.balance.balance import build
 from solver.balance.rounding import resonates_undamped
-from solver.balance.simplifications import even_harmonics_reason
+from solver.scene.scene_harmonics import even_harmonics_reason
 from solver.balance.workspace import Workspace
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.errors import SettingError

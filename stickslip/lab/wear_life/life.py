@@ -10,7 +10,8 @@ import numpy as np
 
 from solver.arrays import Real
 from solver.balance.balance import check_harmonics
-from solver.balance.simplifications import Effects, even_harmonics_reason
+from solver.balance.simplifications import Effects
+from solver.scene.scene_harmonics import even_harmonics_reason
 from solver.continuation.branches.sweep import sweep
 from solver.errors import SettingError, check_count
 from solver.jit.timer import clock

@@ -30,7 +30,7 @@ from solver.continuation.extrema.kernels.peak_state import (
 )
 from solver.continuation.branch import Peak
 from solver.continuation.walk import ContinuationSettings
-from solver.linear.contact_table import second_numbers
+from solver.balance.contact_hessian import second_numbers
 from solver.response.wear import WearSensitivity
 from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene

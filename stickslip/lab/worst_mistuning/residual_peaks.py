@@ -27,7 +27,6 @@ from solver.balance.balance import Balance, build
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.jit import fourier
-from solver.linear.contact_table import port_counts
 from solver.response.contact_response import ContactState, contact_responses
 from solver.response.held_contacts import LeftForces
 from solver.response.wear import lowest
@@ -281,7 +280,7 @@ class ResidualSearch:
         if moves is None or not np.all(np.isfinite(amplitude.by_parameters)):
             raise _NoResponseError
         ks, top = workspace.balance.system.ks, workspace.balance.highest_harmonic
-        ports = np.append(0, np.cumsum(port_counts(annulus)))
+        ports = np.append(0, np.cumsum(annulus.port_counts, dtype=np.int64))
         motions = fourier.to_full(np.concatenate([u.reshape(1, *moves.shape[1:]), moves]), ks, top)
         rooms, slopes = [], []
         for k, i in enumerate(stuck):

@@ -15,7 +15,6 @@ from service.jobs.kinds.previews import run_limits
 from service.jobs.outputs import Silent
 from solver.linear.assembly import linear_model
 from solver.linear.condensation import force_amplitudes
-from solver.linear.contact_table import port_stiffnesses
 from solver.response.time_history import matrices
 
 DEFECTS = Path(__file__).parent.parent.parent / "data" / "defects"
@@ -31,7 +30,7 @@ def amplitudes(scene, hz, *, stuck):
     model = linear_model(scene)
     K, C, L = matrices(model, 1)
     if stuck:
-        K = K + L.conj().T @ (port_stiffnesses(scene, model)[:, None] * L)
+        K = K + L.conj().T @ (model.port_stiffnesses[:, None] * L)
     force = force_amplitudes(model, np.array([1]))[0]
     omega = 2.0 * math.pi * np.asarray(hz)[:, None, None]
     motion = np.linalg.solve(

@@ -12,7 +12,7 @@ from solver.balance.kernels.jacobian import factorise, step_back, step_back_tran
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import UNHELD, evaluation_by_value
 from solver.linear.assembly import linear_model
-from solver.linear.leading_ports import leading_ports
+from solver.linear.condensation import leading_ports
 from solver.scene.scene_harmonics import spread
 from solver.sensitivity.gradient import Sensitivities
 from solver.studies.memory import dense_bytes

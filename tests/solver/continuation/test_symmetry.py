@@ -10,8 +10,8 @@ from scene_cases import bladed_disk, two_dof
 
 from solver import Effects, Scene, march, plan, solve, sweep
 from solver.balance.balance import build
-from solver.balance.simplifications import even_harmonics_reason
 from solver.continuation.branches.symmetry_breaking import NOT_UNIQUE, SYMMETRIC_UNSTABLE, WAVE_ASSUMED
+from solver.scene.scene_harmonics import even_harmonics_reason
 
 
 def duffing(force: float, c: float = 0.2, a3: float = 1.0, k: float = 1.0) -> Scene:

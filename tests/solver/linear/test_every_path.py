@@ -12,11 +12,11 @@ from random_scenes import random_scene
 from random_space import random_space
 from scene_cases import bladed_disk, two_dof
 
+from solver.balance.balance import contact_rows
 from solver.balance.parameter import Kind, Parameter, resolve
 from solver.contacts.load_derivatives import load_slopes
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.condensation import force_amplitudes, term_amplitudes
-from solver.linear.contact_table import contact_table
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import Scene, load_scene, shipped_scenes
 
@@ -100,7 +100,7 @@ def sizes(scene: Scene, column: int) -> dict[str, Any]:
     loads = [[] if c.load is None else c.load.coefficients for c in scene.contacts]
     return {
         "K": K, "C": C, "M": M, "L": model.ports_at(diameters), "f": force_amplitudes(model, KS),
-        "table": np.nan_to_num(contact_table(scene, 3)[:, column]),
+        "table": np.nan_to_num(contact_rows(scene, 3)[:, column]),
         "loads": np.concatenate([np.zeros(0), *loads]),
     }  # fmt: skip
 
@@ -116,7 +116,7 @@ def slopes(scene: Scene, parameter: Parameter) -> dict[str, Any]:
         if d.contact_here is not None and d.contact_next is not None:
             found["L"] = d.contact_here + d.contact_next * model.turns(diameters)[:, None, None]
     elif parameter.kind is Kind.CONTACTS:
-        rows = contact_table(scene, 3)
+        rows = contact_rows(scene, 3)
         gained = np.zeros_like(rows)
         found["table"] = gained[:, parameter.column] = parameter.active
         loads = load_slopes(rows, gained, parameter.column)

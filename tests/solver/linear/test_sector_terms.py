@@ -13,7 +13,7 @@ from solver.balance.balance import build
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import MODES
 from solver.linear.assembly import linear_model, structure_derivative
-from solver.linear.modal import decompose, matrices_of
+from solver.linear.modal import decompose
 from solver.linear.natural_frequencies import natural_frequencies
 from solver.scene.cyclic.annulus import annulus
 from solver.sensitivity.gradient import Sensitivities
@@ -130,7 +130,7 @@ def test_a_sector_without_terms_keeps_its_modes_found_once() -> None:
     given = both({})[1]
     n, moving = np.array([0, 1, 2]), np.array([False, True, True])
     scenes = given, given.with_values({"root.N0": 3.0})
-    held = [matrices_of(linear_model(scene), n, moving) for scene in scenes]
+    held = [linear_model(scene).matrices(n, moving) for scene in scenes]
     assert held[0] is held[1]
     found = decompose(held[0])
     assert found is not None

@@ -11,7 +11,6 @@ import solver
 from solver import Scene
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
-from solver.linear.contact_table import port_stiffnesses
 from solver.linear.model import LinearModel
 from solver.response.history_dependence import Start, keeps_sticking
 
@@ -29,7 +28,7 @@ def _start(scene: Scene) -> Start:
     model, rng = linear_model(scene), np.random.default_rng(3)
     x, v = rng.normal(size=(2, model.sectors, len(model.dofs)))
     omega = 2.0 * math.pi * float(np.mean(scene.observe.band))
-    stiffness = port_stiffnesses(scene, model)
+    stiffness = model.port_stiffnesses
     return Start(model=model, stiffness=stiffness, x=x, v=omega * v, omega=omega)
 
 

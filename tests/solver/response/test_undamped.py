@@ -13,7 +13,7 @@ from solver.balance.balance import build
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import BranchStatus
-from solver.linear.modal import undamped_resonance
+from solver.linear.natural_frequencies import undamped_resonance
 from solver.studies.peaks.seeds import fitted
 from stickslip.lab.quasi_periodic.quasi_periodic_result import QuasiPeriodicStatus
 
