@@ -16,7 +16,7 @@ import optim
 import solver
 from service.jobs.kinds import warm_up
 from solver.contacts.laws.law_registry import laws
-from solver.jit import beside
+from solver.jit import compiler_process
 
 
 def referee() -> None:
@@ -52,22 +52,22 @@ def main() -> None:
     parser.add_argument("--beside", action="store_true", help="end if another process compiles already")
     asked = parser.parse_args()
     # Who compiles waits for nobody's kernels.
-    os.environ.setdefault(beside.SETTING, "compiled")
+    os.environ.setdefault(compiler_process.SETTING, "compiled")
     from solver.jit.parallel import compile_together
 
-    with beside.compiling(wait=not asked.beside) as mine:
+    with compiler_process.compiling(wait=not asked.beside) as mine:
         if not mine:
             return
         if asked.beside and hasattr(os, "nice"):
             os.nice(5)
         if asked.first or asked.beside:
             compile_together([warm_up], listed=False)
-            beside.compiled(beside.Stage.FIRST)
+            compiler_process.compiled(compiler_process.Stage.FIRST)
         if not asked.first:
             more = [shipped_scenes] if asked.scenes else []
             compile_together([warm_up, referee, functions_of_laws, *more])
-            for stage in beside.Stage:
-                beside.compiled(stage)
+            for stage in compiler_process.Stage:
+                compiler_process.compiled(stage)
 
 
 if __name__ == "__main__":

@@ -77,13 +77,13 @@ def _first_call(package: str, name: str) -> Callable[..., object] | None:
     """What stands for a function while nothing is compiled: it prepares kernels for what it is asked."""
     if os.environ.get("STICKSLIP_KERNELS") or "solver.jit.way" in sys.modules:
         return None
-    beside = import_module("solver.jit.beside")
-    if not beside.is_open():
+    compiler_process = import_module("solver.jit.compiler_process")
+    if not compiler_process.is_open():
         return None
 
     def asked(scene: object, *args: object, **kwargs: object) -> object:
         scene = _scene_of(scene)
-        beside.prepare(lambda: beside.cost(name, scene, kwargs))
+        compiler_process.prepare(lambda: compiler_process.cost(name, scene, kwargs))
         value: Callable[..., object] = getattr(sys.modules[package], name)
         return value(scene, *args, **kwargs)
 

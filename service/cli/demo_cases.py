@@ -16,7 +16,7 @@ import numpy as np
 import solver
 from service.cli.failures import ShortfallError
 from service.rendering.text import say
-from solver.jit import beside
+from solver.jit import compiler_process
 
 REMOVED, STUCK = 0.0, 1e9
 """Normal loads [N] at which a contact does nothing, and never slips."""
@@ -61,7 +61,7 @@ def first_told() -> int:
 
     It waits for no compiler; what follows takes longer interpreted than compiling does.
     """
-    return told_without_compiler(CASES[0]) if beside.missing() else 0
+    return told_without_compiler(CASES[0]) if compiler_process.missing() else 0
 
 
 def told_without_compiler(case: DemoCase) -> int:

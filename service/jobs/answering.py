@@ -27,7 +27,7 @@ from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.strict_json import JsonText, digest, encoded
 from service.jobs.studies.plan_study import Plan
 from service.jobs.study import Watch
-from solver.jit.beside import interpret
+from solver.jit.compiler_process import interpret
 
 PLAN, READ, TEXT, STORE, RESOLVE, PREVIEW = "plan", "read", "text", "store", "resolve", "preview"
 MEASURED, LOOK, EDIT, PARAMETERS = "measured", "look", "edit", "parameters"

@@ -49,7 +49,7 @@ from service.settings.settings import Settings
 from service.uploads.uploads import Uploads
 from service.workers.executors import executor_of
 from service.workers.warm_pool import Answers, Previews
-from solver.jit import beside
+from solver.jit import compiler_process
 
 log = logging.getLogger("stickslip.service")
 
@@ -172,10 +172,11 @@ class Service:
     def start(self) -> None:
         """Open the database, start queue and workers; `open` lists the errors."""
         self.open()
-        self.compiling = beside.missing()
+        self.compiling = compiler_process.missing()
         if self.compiling:
-            beside.begin()
-            beside.interpret()  # what this process loads, and does not compute with, waits for nobody
+            compiler_process.begin()
+            # What this process loads, and does not compute with, waits for nobody.
+            compiler_process.interpret()
         try:
             self.queue.start()
         except BaseException:

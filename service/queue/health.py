@@ -12,7 +12,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from service.db import revisions
 from service.db.engine import sqlite_note
 from service.queue.core import SOLVER_VERSION, Service
-from solver.jit.beside import told
+from solver.jit.compiler_process import told
 
 _PROBE_SECONDS = 2.0
 

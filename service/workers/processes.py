@@ -30,7 +30,7 @@ from typing import Any
 
 from service.workers.process_limits import address_space, limit_process
 from service.workers.worker import THREAD_LIMITS
-from solver.jit.beside import missing
+from solver.jit.compiler_process import missing
 
 PRELOADED = "service.workers.preloaded"
 _OURS = "STICKSLIP_"

@@ -40,7 +40,7 @@ from service.workers.executor import Failed, Finished, Lost, Outcome, Stopped, U
 from service.workers.executors import LocalExecutor
 from service.workers.process_limits import UNLIMITED, ProcessLimits
 from solver.errors import Issue
-from solver.jit.beside import missing
+from solver.jit.compiler_process import missing
 
 _SILENT = Pace(progress_seconds=3600.0, checkpoint_seconds=3600.0, checkpoint_bytes=0)
 _REMEMBERED = 64

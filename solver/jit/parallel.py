@@ -18,7 +18,7 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from solver.jit.way import WAY, Way
 
 if WAY is Way.COMPILED:
-    from solver.jit.beside import note
+    from solver.jit.compiler_process import note
     from solver.jit.slots import make, watched
 
 MOST_PROCESSES = 4  # each compiles the short kernels for itself, and takes 600 MB at most

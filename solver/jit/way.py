@@ -7,7 +7,7 @@ from enum import StrEnum
 from importlib.util import find_spec
 from typing import Final
 
-from solver.jit import beside
+from solver.jit import compiler_process
 
 
 class Way(StrEnum):
@@ -23,14 +23,14 @@ def _settled() -> Way:
 
     Else they are compiled where Numba is; another process does it if they are not on disk.
     """
-    asked = os.environ.get(beside.SETTING)
+    asked = os.environ.get(compiler_process.SETTING)
     if asked:
         if asked not in tuple(Way):
-            raise ValueError(f"{beside.SETTING} is {asked!r}, and must be one of {', '.join(Way)}")
+            raise ValueError(f"{compiler_process.SETTING} is {asked!r}, and must be one of {', '.join(Way)}")
         return Way(asked)
-    if beside.interprets() or find_spec("numba") is None:
+    if compiler_process.interprets() or find_spec("numba") is None:
         return Way.INTERPRETED
-    beside.ready()
+    compiler_process.ready()
     return Way.COMPILED
 
 

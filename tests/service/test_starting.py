@@ -15,18 +15,18 @@ from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.queue.health import readiness
 from service.workers import processes
 from service.workers.warm_pool import Previews
-from solver.jit import beside
+from solver.jit import compiler_process
 from solver.jit.folder import folder
 
 
 def tell_way(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
     import os
 
-    return JobOutput(result={"interprets": beside.interprets(), "process": os.getpid()})
+    return JobOutput(result={"interprets": compiler_process.interprets(), "process": os.getpid()})
 
 
 def begins() -> None:
-    beside.interpret()
+    compiler_process.interpret()
 
 
 KINDS = Registry(
@@ -42,7 +42,7 @@ def told(previews: Previews) -> dict[str, Any]:
 def test_previews_begin_interpreted_and_go_over_to_compiled_kernels(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delenv(beside.SETTING, raising=False)
+    monkeypatch.delenv(compiler_process.SETTING, raising=False)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     # From nothing: what others are forked off would look for the kernels that nobody compiled.
     monkeypatch.setattr(processes, "_settings_of_the_first", {"of": "another time"})
@@ -52,7 +52,7 @@ def test_previews_begin_interpreted_and_go_over_to_compiled_kernels(
         first = told(previews)
         assert first["interprets"]
         assert previews._seconds > 1.0
-        beside.compiled(beside.Stage.FIRST)
+        compiler_process.compiled(compiler_process.Stage.FIRST)
         previews.renew()
         second = told(previews)
         assert not second["interprets"]

@@ -24,7 +24,7 @@ from service.cli.options.parameters import Command, keyword, parameters_of, with
 from service.errors import InputError
 from service.jobs.common.scene_requests import UPLOAD, Place, named_files, with_named
 from solver.errors import Issue, SceneError, SettingError
-from solver.jit.beside import cost, prepare
+from solver.jit.compiler_process import cost, prepare
 from solver.scene.toml import TomlError, read_toml
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import solver
 from service.jobs.kind_registry import Registry
 from service.jobs.names import there
 from service.jobs.study import Study, study_named
-from solver.jit.beside import ready
+from solver.jit.compiler_process import ready
 
 
 def warm_up() -> None:

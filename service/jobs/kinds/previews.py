@@ -40,7 +40,7 @@ from service.jobs.studies.modes_study import Diameter
 from service.jobs.studies.solve_study import solve_result
 from solver.continuation.branch import AnyBranch, PeakCertificate
 from solver.errors import Issue, Naming
-from solver.jit.beside import interpret
+from solver.jit.compiler_process import interpret
 from solver.scene.descriptions import DAMPER_LOAD
 from solver.scene.scene import Scene
 

@@ -55,7 +55,7 @@ def line_lasts(
     return (does * rate if math.isinf(kt) else does * kt * rate - limit_rate,)
 
 
-def line_left(direction: float, kt: float, u: _Line, limit: _Line) -> _Line:
+def line_left(direction: Any, kt: float, u: _Line, limit: _Line) -> _Line:
     """Return where a slip leaves the slider that it moves, w = u − ξΛ/kt."""
     return u - direction * limit / kt
 

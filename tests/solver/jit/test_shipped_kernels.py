@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from solver.jit import beside
+from solver.jit import compiler_process
 from solver.jit import folder as shipped
 from solver.jit.folder import folder
 
@@ -21,7 +21,7 @@ def packed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """An archive of what stands for kernels, on a machine that has none compiled."""
     place = tmp_path / "package"
     place.mkdir()
-    for name in (beside.SETTING, shipped.CPU_NAME, shipped.CPU_FEATURES):
+    for name in (compiler_process.SETTING, shipped.CPU_NAME, shipped.CPU_FEATURES):
         monkeypatch.setenv(name, "")  # so that what is set by the test ends with it
         monkeypatch.delenv(name)
     found = shipped.archive
@@ -41,39 +41,39 @@ def packed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def test_they_are_unpacked_once_and_the_compiler_is_told_for_which_processor(packed: Path) -> None:
-    assert beside.on_disk()
-    assert not beside.missing()
+    assert compiler_process.on_disk()
+    assert not compiler_process.missing()
     names = {file.name for file in folder().iterdir()}
     assert names == {"kernel.py311.nbi", "kernel.py311.1.nbc", "shipped.some-level"}
     assert (folder() / "kernel.py311.1.nbc").read_bytes() == b"code"
     assert (os.environ[shipped.CPU_NAME], os.environ[shipped.CPU_FEATURES]) == ("some-level", "+a,+b")
     packed.unlink()
-    assert beside.on_disk()
+    assert compiler_process.on_disk()
 
 
 def test_of_other_sources_they_are_left_alone(packed: Path) -> None:
     packed.rename(packed.with_name(f"0123456789abcdef{packed.name[16:]}"))
-    assert not beside.on_disk()
+    assert not compiler_process.on_disk()
     assert shipped.CPU_NAME not in os.environ
 
 
 @pytest.mark.usefixtures("packed")
 def test_a_processor_without_what_they_need_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shipped, "target", lambda: None)
-    assert not beside.on_disk()
+    assert not compiler_process.on_disk()
 
 
 @pytest.mark.usefixtures("packed")
 def test_those_compiled_for_this_very_processor_come_first() -> None:
-    beside.compiled(beside.Stage.FIRST)
-    assert beside.on_disk()
+    compiler_process.compiled(compiler_process.Stage.FIRST)
+    assert compiler_process.on_disk()
     assert shipped.CPU_NAME not in os.environ
 
 
 @pytest.mark.usefixtures("packed")
 def test_who_asks_for_another_processor_gets_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(shipped.CPU_NAME, "generic")
-    assert not beside.on_disk()
+    assert not compiler_process.on_disk()
 
 
 @pytest.mark.usefixtures("packed")

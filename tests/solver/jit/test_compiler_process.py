@@ -12,30 +12,30 @@ from pathlib import Path
 import pytest
 
 import solver
-from solver.jit import beside
+from solver.jit import compiler_process
 
 ROOT = Path(__file__).parent.parent.parent.parent
 # Stands for the compiler: it is there, tells how far it is, and marks all as done when a file appears.
 COMPILER = """
 import sys, time
 from pathlib import Path
-from solver.jit import beside
-with beside.compiling(wait=False) as mine:
-    with open(beside.folder() / "began", "a") as began:
+from solver.jit import compiler_process
+with compiler_process.compiling(wait=False) as mine:
+    with open(compiler_process.folder() / "began", "a") as began:
         began.write("mine\\n" if mine else "other\\n")
     if mine:
-        beside.note(3, 7)
-        while not (beside.folder() / "go").exists():
+        compiler_process.note(3, 7)
+        while not (compiler_process.folder() / "go").exists():
             time.sleep(0.02)
-        beside.compiled(beside.Stage.FIRST)
+        compiler_process.compiled(compiler_process.Stage.FIRST)
 """
 """What a command does before it computes."""
 PREPARES = """
 import sys
-from solver.jit import beside
-beside.COMPILER, beside._LINE, beside._PATIENCE = "compiler", 0.1, 5.0
-beside.prepare(lambda: float(sys.argv[1]))
-print(beside.interprets(), beside.on_disk())
+from solver.jit import compiler_process
+compiler_process.COMPILER, compiler_process._LINE, compiler_process._PATIENCE = "compiler", 0.1, 5.0
+compiler_process.prepare(lambda: float(sys.argv[1]))
+print(compiler_process.interprets(), compiler_process.on_disk())
 """
 
 
@@ -43,7 +43,7 @@ print(beside.interprets(), beside.on_disk())
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """The folder of the kernels of processes that begin with none, and with a compiler that is none."""
     (tmp_path / "compiler.py").write_text(COMPILER, "utf-8")
-    monkeypatch.delenv(beside.SETTING, raising=False)
+    monkeypatch.delenv(compiler_process.SETTING, raising=False)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
     code = "from solver.jit.folder import folder; print(folder())"
@@ -111,13 +111,13 @@ def test_where_the_compiler_fails_nobody_waits_for_ever(folder: Path) -> None:
     ],
 )
 def test_what_is_small(kind: str, scene: str, asked: dict[str, object], small: bool) -> None:
-    assert (beside.cost(kind, solver.load_scene(scene), asked) <= beside.SMALL) is small
+    assert (compiler_process.cost(kind, solver.load_scene(scene), asked) <= compiler_process.SMALL) is small
 
 
 @pytest.mark.parametrize("arguments", ["solve two-dof --frequency 1", "design two-dof"])
 def test_a_command_prepares_before_it_loads_a_kernel(folder: Path, arguments: str) -> None:
     code = (
-        "import sys; from solver.jit import beside; beside.COMPILER = 'compiler';"
+        "import sys; from solver.jit import compiler_process; compiler_process.COMPILER = 'compiler';"
         "from service.cli.table import run; sys.exit(run(sys.argv[1:]))"
     )
     ran = subprocess.run(
@@ -132,7 +132,7 @@ def test_a_command_prepares_before_it_loads_a_kernel(folder: Path, arguments: st
 
 def test_a_script_prepares_before_it_loads_a_kernel(folder: Path) -> None:
     code = (
-        "import solver; from solver.jit import beside; beside.COMPILER = 'compiler'\n"
+        "import solver; from solver.jit import compiler_process; compiler_process.COMPILER = 'compiler'\n"
         "print(solver.solve('two-dof', frequency_hz=1.0, harmonics=1).max_abs)"
     )
     ran = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
