@@ -15,18 +15,16 @@ damped: ζ below some ε.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from solver.balance.balance import Balance
 from solver.balance.kernels.linearised_contacts import fill_springs
 from solver.balance.parameter import Kind
-from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import (
     DENSE,
     MODES,
-    System,
     evaluation_by_value,
     of_all_ports,
     receptance_by_value,
@@ -35,6 +33,10 @@ from solver.jit.fourier import Complex, Flags, Real
 from solver.linear.condensation import force_amplitudes
 from solver.linear.kernels.receptance import excitation
 from solver.matrices.normal_modes import hermitian, undamped_modes
+from solver.scene.scene_harmonics import Amplitudes
+
+if TYPE_CHECKING:
+    from solver.balance.workspace import Workspace
 
 # What the entries of the matrices are off by, and sums of what cancels, found on random scenes.
 LOST_BITS = 4.0 * float(np.finfo(float).eps)
@@ -69,8 +71,9 @@ def observed_rounding(workspace: Workspace, u: Real, p: float, *, across: bool) 
     balance = workspace.balance
     system, point = balance.system, evaluation_by_value(workspace.point)
     linear = of_all_ports(system, receptance_by_value(workspace.linear))
-    motions = amplitudes(system, u.reshape(point.F.shape))
-    forces = amplitudes(system, point.F) - system.shift[:, None] * motions
+    hat = Amplitudes(system.ks)
+    motions = hat.of(u.reshape(point.F.shape))
+    forces = hat.of(point.F) - system.shift[:, None] * motions
     loop = linear.B[0] if not point.F.shape[0] else _through_contacts(workspace, linear.A[0], linear.B[0])
     chains = _chains(balance, forces.T, loop, p)
     pushed, free = np.abs(forces.T), linear.x_linear[0]
@@ -82,25 +85,6 @@ def observed_rounding(workspace: Workspace, u: Real, p: float, *, across: bool) 
         cancelled += (np.abs(loop) * moved).sum(axis=1)
     changes = _changes(balance, chains, observed, p, across=across)
     return LOST_BITS * float(np.sum(changes + _LOST_SUMS * cancelled))
-
-
-def amplitudes(system: System, coefficients: Real) -> Complex:
-    """Return the complex amplitudes (..., nk) of coefficients (..., n) of the harmonics kept."""
-    odd = int(system.ks[0] == 0)
-    found = np.empty((*coefficients.shape[:-1], system.ks.size), np.complex128)
-    found[..., :odd] = coefficients[..., :odd]
-    found[..., odd:] = coefficients[..., odd::2] - 1j * coefficients[..., odd + 1 :: 2]
-    return found
-
-
-def coefficients(system: System, found: Complex) -> Real:
-    """Return the coefficients (..., n) of complex amplitudes (..., nk) of the harmonics kept."""
-    odd = int(system.ks[0] == 0)
-    kept = np.empty((*found.shape[:-1], 2 * system.ks.size - odd))
-    kept[..., :odd], kept[..., odd::2], kept[..., odd + 1 :: 2] = (
-        found[..., :odd].real, found[..., odd:].real, -found[..., odd:].imag,
-    )  # fmt: skip
-    return kept
 
 
 def _through_contacts(workspace: Workspace, A: Complex, B: Complex) -> Complex:

@@ -12,39 +12,10 @@ from typing import Annotated
 
 import numpy as np
 
-from solver.balance.balance import Balance
 from solver.balance.parameter_derivatives import HarmonicMatrices
 from solver.contacts.kernels.system import DENSE, MODES, System
-from solver.jit.fourier import Complex, Real, cosine_position
+from solver.jit.fourier import Complex, Real
 from solver.linear.model import dynamic_stiffness
-
-
-class Amplitudes:
-    """Real coefficients of kept harmonics as complex amplitudes v̂ = v_c − i v_s."""
-
-    def __init__(self, balance: Balance) -> None:
-        ks = balance.system.ks
-        self.ks = ks
-        self._cosines = np.array([cosine_position(ks, i) for i in range(ks.size)])
-        self._sines = np.where(ks > 0, self._cosines + 1, 0)
-        self._moving = (ks > 0).astype(np.float64)
-        self._size = balance.n_coefficients
-
-    def of(self, coefficients: Real) -> Complex:
-        """Return the amplitudes (..., nk) of coefficients (..., n)."""
-        sines = coefficients[..., self._sines] * self._moving
-        return np.asarray(coefficients[..., self._cosines] - 1j * sines)
-
-    def coefficients(self, amplitudes: Complex) -> Real:
-        """Return the coefficients (..., n) of amplitudes (..., nk)."""
-        found = np.empty((*amplitudes.shape[:-1], self._size))
-        found[..., self._sines] = -amplitudes.imag
-        found[..., self._cosines] = amplitudes.real
-        return found
-
-    def turn(self, tau: float) -> Complex:
-        """Return e^{ikτ}, (nk,)."""
-        return np.asarray(np.exp(1j * tau * self.ks))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,7 +18,6 @@ from solver.balance.kernels.mechanics import ALLOWED
 from solver.balance.kernels.newton import ACCEPTED
 from solver.balance.kernels.output import LOST, MEASURES
 from solver.balance.kernels.residual import evaluate
-from solver.balance.rounding import amplitudes
 from solver.balance.workspace import PointSolution, Workspace
 from solver.contacts.kernels.columns import KT
 from solver.contacts.kernels.system import AT_BRANCH_POINT, evaluation_by_value
@@ -42,6 +41,7 @@ from solver.jit.timer import clock
 from solver.linear.kernels.receptance import receptance
 from solver.linear.natural_frequencies import undamped_resonance
 from solver.results.told import Piece
+from solver.scene.scene_harmonics import Amplitudes
 
 STIFFEST = 1e7
 NEIGHBOUR = 0.05  # largest change of the vibration, relative, over which a branch is taken up again
@@ -211,7 +211,8 @@ def ends_undamped(workspace: Workspace, points: Real, start: float) -> bool:
         evaluate(workspace.system, workspace.linear, u, p, 0.0, workspace.point)
         F = evaluation_by_value(workspace.point).F
         moves = balance.system.ks > 0
-        pairs = amplitudes(balance.system, u.reshape(F.shape)), amplitudes(balance.system, F)
+        hat = Amplitudes(balance.system.ks)
+        pairs = hat.of(u.reshape(F.shape)), hat.of(F)
         motions, forces = (each[:, moves].T for each in pairs)
         seen = np.abs(motions) > _MOVES * np.abs(motions).max(initial=0.0)
         held = np.where(seen, (forces / np.where(seen, motions, 1.0)).real, 0.0)

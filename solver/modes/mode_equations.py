@@ -22,7 +22,6 @@ from solver.balance.balance import Balance
 from solver.balance.kernels.output import extremes
 from solver.balance.kernels.residual import evaluate
 from solver.balance.kernels.slopes import take_slopes
-from solver.balance.whole_motion import Amplitudes
 from solver.contacts.kernels.system import (
     UNHELD,
     by_reference,
@@ -40,6 +39,7 @@ from solver.modes.kernels.mode_assembly import (
 )
 from solver.modes.mode_structure import Dynamics, ModeStructure, structure_of
 from solver.modes.sparse import Factors, Layout, SparseJacobian
+from solver.scene.scene_harmonics import Amplitudes
 
 BESIDES = 4  # unknowns beside the motions: Re q, Im q, ω, ζ
 
@@ -110,7 +110,7 @@ class Equations:
     def __init__(self, balance: Balance, alone: Complex | None = None) -> None:
         self.balance, self.alone = balance, alone
         self.structure: ModeStructure = structure_of(balance, alone)
-        self.amplitudes = Amplitudes(balance)
+        self.amplitudes = Amplitudes(balance.system.ks)
         system = balance.system
         self._system = by_reference(system)
         self._linear = new_receptance(self._system)

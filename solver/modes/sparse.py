@@ -20,8 +20,8 @@ import numpy as np
 from scipy.sparse import block_array, coo_array, csc_array, csr_array, eye_array, kron
 from scipy.sparse.linalg import SuperLU, splu
 
-from solver.balance.whole_motion import Amplitudes
 from solver.jit.fourier import Complex, Integer, Real, cosine_position
+from solver.scene.scene_harmonics import Amplitudes
 
 SPARSE_FROM = 128  # coordinates: a step of a chain with 97 costs as much either way, one with 181 less
 SPARSE = 0.05  # share of the entries that are not 0, up to which they are kept alone

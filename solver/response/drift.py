@@ -19,7 +19,6 @@ import numpy as np
 from solver.balance.balance import Balance, build
 from solver.balance.kernels.residual import contact_values
 from solver.balance.parameter import Kind
-from solver.balance.whole_motion import Amplitudes
 from solver.balance.workspace import ALONG, PointSolution, Workspace
 from solver.contacts.kernels.columns import PRESTRESSED
 from solver.contacts.kernels.system import UNHELD
@@ -27,6 +26,7 @@ from solver.contacts.laws.contact_parts import Slider
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Integer, Real
 from solver.jit.separate import apart
+from solver.scene.scene_harmonics import Amplitudes
 
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
@@ -144,7 +144,7 @@ class _Drifting:
             workspace=workspace, p=p, start=held.u.copy(), ways=ways, shapes=shapes, pulled=pulled,
             damped=damped, dragged=bool(np.all(np.diag(damped) > _DRAG * most)),
             A=_in_real(linear.A[0], system.ks), sliders=tuple(sliders),
-            free=Amplitudes(balance).coefficients(linear.u_linear[0].T).reshape(-1),
+            free=Amplitudes(balance.system.ks).coefficients(linear.u_linear[0].T).reshape(-1),
         )  # fmt: skip
 
     def first(self, *, above: bool) -> Real:

@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from solver.jit.fourier import Flags, Integer, Real
+from solver.jit.fourier import Complex, Flags, Integer, Real
 from solver.scene.parameter_paths import FREQUENCY, find_parameter
 from solver.scene.scene import Scene
 from solver.scene.scene_parameter import SceneParameter
@@ -179,3 +179,28 @@ def _numbers(ks: Integer) -> Integer:
     """Return where the coefficients of `ks` stand among those of all harmonics, in the order of `fourier`."""
     pairs = np.stack([2 * ks - 1, 2 * ks], axis=1).reshape(-1)
     return pairs[1:] if ks[0] == 0 else pairs
+
+
+class Amplitudes:
+    """Real coefficients of the kept harmonics `ks` as complex amplitudes v̂ = v_c − i v_s."""
+
+    def __init__(self, ks: Integer) -> None:
+        self.ks, self._means = ks, int(ks[0] == 0)
+
+    def of(self, coefficients: Real) -> Complex:
+        """Return the amplitudes (..., nk) of coefficients (..., n)."""
+        means, found = self._means, np.empty((*coefficients.shape[:-1], self.ks.size), np.complex128)
+        found[..., :means] = coefficients[..., :means]
+        found[..., means:] = coefficients[..., means::2] - 1j * coefficients[..., means + 1 :: 2]
+        return found
+
+    def coefficients(self, amplitudes: Complex) -> Real:
+        """Return the coefficients (..., n) of amplitudes (..., nk)."""
+        means, found = self._means, np.empty((*amplitudes.shape[:-1], 2 * self.ks.size - self._means))
+        found[..., :means], later = amplitudes[..., :means].real, amplitudes[..., means:]
+        found[..., means::2], found[..., means + 1 :: 2] = later.real, -later.imag
+        return found
+
+    def turn(self, tau: float) -> Complex:
+        """Return e^{ikτ}, (nk,)."""
+        return np.asarray(np.exp(1j * tau * self.ks))

@@ -36,13 +36,14 @@ from solver.balance.parameter_derivatives import (
     modal_dampings,
     resolved,
 )
-from solver.balance.whole_motion import Amplitudes, WholeMotion, times, whole_motion
+from solver.balance.whole_motion import WholeMotion, times, whole_motion
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.system import FROM_REST, UTILISED, evaluation_by_value
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Integer, Real
 from solver.results.told import Piece
+from solver.scene.scene_harmonics import Amplitudes
 from solver.sensitivity.hessian import (
     Adjoint,
     AmplitudeHessian,
@@ -108,7 +109,7 @@ class Sensitivities:
         self._rows = self._rows_of_paths()
         self._matrices = matrices_of_paths(balance, self._parameters)
         self._dampings = modal_dampings(balance, self._parameters)
-        self._amplitudes = Amplitudes(balance)
+        self._amplitudes = Amplitudes(balance.system.ks)
         self._workspace = Workspace.of(balance)
         self._point = evaluation_by_value(self._workspace.point)
         ne, nc, n = balance.system.laws.size, balance.n_ports, balance.n_coefficients

@@ -17,7 +17,7 @@ from solver.contacts.kernels.system import DENSE, UTILISED
 from solver.continuation.branch import Branch, BranchStatus, Peak, Points
 from solver.continuation.branches.sweep import surveyed, with_error, with_points
 from solver.continuation.extrema.extrema import Survey
-from solver.continuation.extrema.nodes import NodeSolver, PointRow, numbers_of
+from solver.continuation.extrema.nodes import NodeSolver, PointRow
 from solver.jit.fourier import Real
 from solver.jit.timer import clock
 from solver.linear.kernels.receptance import observer_receptance, receptance
@@ -148,7 +148,7 @@ class _Observers:
 
     def seen_by(self, j: int, nodes: Sequence[PointRow]) -> list[PointRow]:
         """Return the nodes as DOF number j sees them."""
-        rows, table = numbers_of(nodes), self._solver.table
+        rows, table = self._solver.numbers(nodes), self._solver.table
         more = len(table.measures) - self._known.size
         if more:
             self._known = np.pad(self._known, (0, more))

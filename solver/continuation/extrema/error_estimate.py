@@ -14,7 +14,7 @@ from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.output import extremes, observed_motion
 from solver.balance.kernels.residual import evaluate
 from solver.balance.more_harmonics import less_harmonics, linear_part, more_harmonics, pad
-from solver.balance.rounding import amplitudes, coefficients, observed_rounding
+from solver.balance.rounding import observed_rounding
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import (
     FROM_REST,
@@ -28,7 +28,7 @@ from solver.continuation.branch import Branch
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
 from solver.results.told import Piece
-from solver.scene.scene_harmonics import MULTIPLES, among, is_fast
+from solver.scene.scene_harmonics import MULTIPLES, Amplitudes, among, is_fast
 
 # Harmonics looked at beyond those kept, for a solution with H of them: H + max(H, 8).
 _LEAST_BEYOND = 8
@@ -103,6 +103,7 @@ class ErrorEstimator:
         self._top = highest + max(highest, _LEAST_BEYOND)
         self._larger = Workspace.of(more_harmonics(balance, self._top, multiples=2 * MULTIPLES), workspace)
         ks = self._larger.balance.system.ks
+        self._hat = Amplitudes(ks)
         self._added = ~among(balance.system.ks, ks)
         added = ks[self._added]
         # Which coefficients are of harmonics kept or of those added, the farthest left out.
@@ -181,7 +182,7 @@ class ErrorEstimator:
         system, linear = self._larger.balance.system, self._larger.receptance(p)
         angles = 2.0 * np.pi / _INSTANTS * np.arange(_INSTANTS)[:, None] * system.ks
         turns = np.exp(1j * angles)
-        motions = np.real(amplitudes(system, U.reshape(system.owner.size, -1)) @ turns.T)
+        motions = np.real(self._hat.of(U.reshape(system.owner.size, -1)) @ turns.T)
         forces = np.zeros((system.ks.size, system.owner.size), np.complex128)
         for first, contact in self._discretised:
             left = contact.unresolved(motions[first])
@@ -189,10 +190,10 @@ class ErrorEstimator:
                 forces[:, first] = 2.0 / _INSTANTS * (left @ turns.conj())
         forces[system.ks == 0] *= 0.5
         pushed = np.matmul(linear.A[0], forces[:, :, None])[:, :, 0]
-        moved = self._step(x, U, p, coefficients(system, pushed.T).reshape(-1), across=across)
+        moved = self._step(x, U, p, self._hat.coefficients(pushed.T).reshape(-1), across=across)
         if moved is None:
             return None
-        seen = -coefficients(system, (linear.B[0] * forces).sum(axis=1))
+        seen = -self._hat.coefficients((linear.B[0] * forces).sum(axis=1))
         after = self._motion(self._larger, *moved.place, elsewhere=across)
         return None if after is None else np.array(self._change(x, after + seen))
 
@@ -204,7 +205,7 @@ class ErrorEstimator:
         if not np.all(np.isfinite(step)):
             return None
         moved = step[: U.size].reshape(-1, larger.balance.n_coefficients)
-        lengths = np.abs(amplitudes(larger.balance.system, moved))  # whenever the clock is started
+        lengths = np.abs(self._hat.of(moved))  # whenever the clock is started
         length = float(lengths.max(initial=abs(step[-1]) if across else 0.0))
         place = U - step[: U.size], p - (float(step[-1]) if across else 0.0)
         after = self._motion(larger, *place, elsewhere=across)

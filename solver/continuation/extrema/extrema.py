@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,14 +30,16 @@ from solver.balance.closed_loop_poles import ClosedLoop
 from solver.balance.kernels.locate import EDGE, HIGH_PEAK, LOW_PEAK
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS, PIECE, RESIDUAL
 from solver.balance.parameter import Kind
-from solver.balance.workspace import Workspace
 from solver.continuation.bracketing import dense_between, fold_between
 from solver.continuation.branch import Band, Branch, Edge, Peak, PeakCertificate, Points, certified, uncertain
 from solver.continuation.extrema.kernels.interval_kernels import IS_BENT, WAVES, WORTH_POLISHING
-from solver.continuation.extrema.nodes import Between, NodeSolver, PointRow, numbers_of
+from solver.continuation.extrema.nodes import Between, NodeSolver, PointRow
 from solver.continuation.extrema.resonance_search import ResonanceSearch, Search
 from solver.continuation.extrema.state_changes import ChangeSearch
 from solver.jit.fourier import Real
+
+if TYPE_CHECKING:
+    from solver.balance.workspace import Workspace
 
 CURVES = ((HIGH, HIGH_SLOPE, HIGH_PEAK), (LOW, LOW_SLOPE, LOW_PEAK))
 
@@ -446,7 +448,7 @@ class Survey:
 
     def _with_folds(self, limit: float) -> tuple[list[PointRow], list[tuple[PointRow, bool]]]:
         """Return the nodes with the folds above the limit among them, and these (and whether smooth)."""
-        onward = self._solver.table.tangents[numbers_of(self._nodes), -1]
+        onward = self._solver.table.tangents[self._solver.numbers(self._nodes), -1]
         turns = onward[1:] * onward[:-1] < 0.0
         if not turns.any():
             return self._nodes, []

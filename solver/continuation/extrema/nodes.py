@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise, product
-from typing import Annotated, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +33,6 @@ from solver.balance.kernels.output import (
     SLOPE,
     measure,
 )
-from solver.balance.whole_motion import Amplitudes
-from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import evaluation_by_value
 from solver.continuation.bracketing import OnBranch, closing_in
 from solver.continuation.branch import ROWS, Points
@@ -42,6 +40,11 @@ from solver.continuation.extrema.kernels import interval_kernels as intervals
 from solver.continuation.extrema.kernels.interval_kernels import look_between, middles_between
 from solver.continuation.extrema.kernels.state_change_kernels import locate_change
 from solver.jit.fourier import Complex, Integer, Real, cosine_position
+from solver.scene.scene_harmonics import Amplitudes
+
+if TYPE_CHECKING:
+    from solver.balance.workspace import Workspace
+    from solver.continuation.extrema.resonance_search import Resonance
 
 _Number = TypeVar("_Number", np.float64, np.int64)
 
@@ -115,15 +118,6 @@ def _longer(array: NDArray[_Number], size: int) -> NDArray[_Number]:
     return longer
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Resonance:
-    """A resonance between two nodes."""
-
-    at: Annotated[float, "ω [rad/s]."]
-    half_width: Annotated[float, "Likewise [rad/s]."]
-    harmonic: Annotated[int, "Number of the harmonic in `System.ks` that meets it."]
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Springs:
     """The contacts at a node: forces, their slopes by λ, and what a small change of motion changes."""
@@ -141,7 +135,7 @@ class LocalModel:
     def __init__(self, solver: NodeSolver) -> None:
         self._solver = solver
         balance = solver.workspace.balance
-        self._system, self.amplitudes = balance.system, Amplitudes(balance)
+        self._system, self.amplitudes = balance.system, Amplitudes(balance.system.ks)
         self._rows = np.zeros(0, np.int64)
         self._springs: dict[int, Springs] = {}  # by the number of the node
         ends = pairwise(self._system.first_port.tolist())
@@ -304,7 +298,7 @@ class NodeSolver:
         workspace : of the same scene with that DOF observed.
         observed, measures : rows of the nodes with it.
         """
-        self.workspace, rows = workspace, numbers_of(nodes)
+        self.workspace, rows = workspace, self.numbers(nodes)
         self.table.observed[rows], self.table.measures[rows] = observed, measures
         self._last = None, 0.0, None
         seen = zip(nodes, measures.tolist(), observed, strict=True)
@@ -316,7 +310,7 @@ class NodeSolver:
 
     def points_of(self, nodes: Sequence[PointRow]) -> Points:
         """Return nodes as the rows of a branch."""
-        rows = numbers_of(nodes)
+        rows = self.numbers(nodes)
         return Points(**{name: getattr(self.table, name)[rows] for name in ROWS})
 
     def _added(
@@ -333,7 +327,7 @@ class NodeSolver:
         known = self._last[2]
         if known is not None and nodes is self._last[0] and top == self._last[1]:
             return known
-        count, table, rows = len(nodes) - 1, self.table, numbers_of(nodes)
+        count, table, rows = len(nodes) - 1, self.table, self.numbers(nodes)
         found = Between(
             measures=table.measures[rows], at=table.solutions[rows, -1], slopes=np.empty((count, 2, 2)),
             reach=np.empty(count), error=np.empty(count), flags=np.empty(count, np.int64),
@@ -344,6 +338,11 @@ class NodeSolver:
         )  # fmt: skip
         self._last = nodes, top, found
         return found
+
+    @staticmethod
+    def numbers(nodes: Sequence[PointRow]) -> Integer:
+        """Return the rows of nodes in the table."""
+        return np.array([node.number for node in nodes], np.int64)
 
     def scales(self, left: PointRow, right: PointRow) -> tuple[float, float]:
         """Return `share_scales` between two nodes."""
@@ -367,7 +366,7 @@ class NodeSolver:
         The k nodes, None where there is no solution, and by how much the cubics of max x and −min x miss
         them [m], infinite where the node was not found on the plane across the chord.
         """
-        table, pairs = self.table, numbers_of(ends).reshape(-1, 2)
+        table, pairs = self.table, self.numbers(ends).reshape(-1, 2)
         count = len(pairs)
         found, ways = np.zeros((count, table.solutions.shape[1])), np.zeros((count, table.solutions.shape[1]))
         x, out = np.zeros((count, table.observed.shape[1])), np.zeros((count, MEASURES))
@@ -590,8 +589,3 @@ def share_scales(left: OnBranch, right: OnBranch, least: float) -> tuple[float, 
         left.solution, right.solution, left.tangent, right.tangent, least
     )
     return scales
-
-
-def numbers_of(nodes: Sequence[PointRow]) -> Integer:
-    """Return the rows of nodes in the table of their solver."""
-    return np.array([node.number for node in nodes], np.int64)

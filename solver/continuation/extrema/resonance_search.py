@@ -16,15 +16,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS
 from solver.continuation.bracketing import dense_between
 from solver.continuation.extrema.kernels.suspects import find_suspects
-from solver.continuation.extrema.nodes import NodeSolver, NodeTable, PointRow, Resonance, numbers_of
 from solver.jit.fourier import Complex, Flags, Integer, Real
+
+if TYPE_CHECKING:
+    from solver.continuation.extrema.nodes import NodeSolver, PointRow
 
 # What a resonance adds to the amplitude, relative to what stands there, from which it is solved for. What
 # stands there counts as this share of the highest point at least.
@@ -46,6 +48,15 @@ MOST_ROUNDS = 12
 PREDICTED, PREDICTED_OF_TOP = 0.02, 2e-3
 MOST_HALVINGS = 12
 MOST_NODES = 6000  # that one search adds
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Resonance:
+    """A resonance between two nodes."""
+
+    at: Annotated[float, "ω [rad/s]."]
+    half_width: Annotated[float, "Likewise [rad/s]."]
+    harmonic: Annotated[int, "Number of the harmonic in `System.ks` that meets it."]
 
 
 @dataclass(slots=True)
@@ -76,8 +87,8 @@ class _Intervals:
     length: Annotated[Real, "Length [rad/s], (P,)."]
 
     @classmethod
-    def of(cls, nodes: list[PointRow], begin: Integer, table: NodeTable) -> _Intervals:
-        rows = numbers_of(nodes)
+    def of(cls, nodes: list[PointRow], begin: Integer, solver: NodeSolver) -> _Intervals:
+        rows, table = solver.numbers(nodes), solver.table
         solutions = table.solutions[rows]
         at = solutions[:, -1]
         low, high = np.minimum(at[begin], at[begin + 1]), np.maximum(at[begin], at[begin + 1])
@@ -133,7 +144,7 @@ class ResonanceSearch:
         `begin` (P,) are the numbers of the nodes that the intervals begin at.
         """
         wanted: dict[int, list[Resonance]] = {}
-        rows = _Intervals.of(found.nodes, begin, self._solver.table)
+        rows = _Intervals.of(found.nodes, begin, self._solver)
         for j, one in self._narrow(rows, *self._unsettled(rows, *np.nonzero(self._suspects(rows, top)))):
             left, right = found.nodes[begin[j]], found.nodes[begin[j] + 1]
             height, share = self._model.adds(left, right, one)

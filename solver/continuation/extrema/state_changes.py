@@ -7,13 +7,17 @@ the interval, and nothing at its ends tells of that (`state_change_kernels`).
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.balance.kernels.output import HIGH, LOW, MAX_ABS, PIECE
 from solver.continuation.extrema.kernels.interval_kernels import BENT, MATTERS, STEEP, WORTH_POLISHING
-from solver.continuation.extrema.nodes import NodeSolver, PointRow, numbers_of
 from solver.jit.fourier import Integer, Real
+
+if TYPE_CHECKING:
+    from solver.continuation.extrema.nodes import NodeSolver, PointRow
 
 # Up to these departures from what the points beside an interval foretell a change in it hides no maximum:
 # relative to the amplitude, and as a part of the slopes.
@@ -73,7 +77,7 @@ class ChangeSearch:
         self, nodes: list[PointRow], top: float, departs: NDArray[np.bool_]
     ) -> NDArray[np.bool_]:  # fmt: skip
         """Return where a contact may change and change back with a maximum between, (P − 1,)."""
-        seen, table, rows = self._solver.look(nodes, top), self._solver.table, numbers_of(nodes)
+        seen, table, rows = self._solver.look(nodes, top), self._solver.table, self._solver.numbers(nodes)
         stands = np.maximum(seen.measures[1:, MAX_ABS], seen.measures[:-1, MAX_ABS])
         may = (np.diff(seen.measures[:, PIECE]) == 0.0) & (stands >= self._worth * top)
         may &= departs.all(axis=0)

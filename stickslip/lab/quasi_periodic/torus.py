@@ -9,7 +9,7 @@ import numpy as np
 
 from solver.arrays import Real
 from solver.balance.balance import Balance
-from solver.balance.whole_motion import Amplitudes
+from solver.scene.scene_harmonics import Amplitudes
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Flags, Integer
 from solver.response.solution import Solution
@@ -69,11 +69,11 @@ class ContactMotions:
         """Return those of unknowns (n_unknowns,) of p and q turns."""
         ks = balance.system.ks
         k, l = _sums(ks, p, q, int(ks[-1]) + 1)  # noqa: E741
-        return cls(k, l, Amplitudes(balance).of(u.reshape(-1, balance.n_coefficients)))
+        return cls(k, l, Amplitudes(balance.system.ks).of(u.reshape(-1, balance.n_coefficients)))
 
     def guess(self, balance: Balance, p: int, q: int) -> Real:
         """Return the unknowns of p and q turns: waves whose sum is no harmonic kept are left out."""
-        amplitudes = Amplitudes(balance)
+        amplitudes = Amplitudes(balance.system.ks)
         place = {n: i for i, n in enumerate(balance.system.ks.tolist())}
         found = np.zeros((len(self.u), len(place)), np.complex128)
         for n, c in zip((self.k * p + self.l * q).tolist(), self.u.T, strict=True):

@@ -10,7 +10,7 @@ from solver.balance.balance import build
 from solver.balance.known_springs import MOST_ENTRIES
 from solver.balance.workspace import Workspace
 from solver.continuation.branches.sweep import walk
-from solver.continuation.extrema.nodes import NodeSolver, numbers_of
+from solver.continuation.extrema.nodes import NodeSolver
 from solver.continuation.stretches import joined
 from solver.jit.fourier import Real
 
@@ -32,7 +32,7 @@ def test_springs_of_a_walk_are_those_worked_out_anew() -> None:
     found = []
     for each in (workspace, again):
         nodes = NodeSolver(each)
-        rows = nodes.model.rows(numbers_of(nodes.nodes_of(points)))
+        rows = nodes.model.rows(nodes.numbers(nodes.nodes_of(points)))
         found.append(nodes.model.stiffness(rows, np.full(rows.size, 3)))
     assert found[0] == pytest.approx(found[1], rel=1e-11, abs=1e-9 * np.abs(found[1]).max())
     # The mean of R⁻¹ (dF/dU) R over all shifts R in time is what commutes with them.
