@@ -37,26 +37,18 @@ Positive = Annotated[float, Field(strict=True, gt=0.0, le=LARGEST, allow_inf_nan
 INFINITE = "inf"  # what stands for infinity where JSON has no number for it
 
 
-def _read_infinite(value: object) -> object:
-    return math.inf if value == INFINITE else value
-
-
 def _largest_unless_infinite(value: float) -> float:
     if LARGEST < value < math.inf:
         raise PydanticKnownError("less_than_equal", {"le": LARGEST})
     return value
 
 
-def _write_infinite(value: float) -> float | str:
-    return INFINITE if math.isinf(value) else value
-
-
 Stiffness = Annotated[
     float,
     Field(strict=True, gt=0.0, allow_inf_nan=True),
-    BeforeValidator(_read_infinite),
+    BeforeValidator(lambda value: math.inf if value == INFINITE else value),
     AfterValidator(_largest_unless_infinite),
-    PlainSerializer(_write_infinite, when_used="json"),
+    PlainSerializer(lambda value: INFINITE if math.isinf(value) else value, when_used="json"),
     WithJsonSchema(
         {"anyOf": [{"type": "number", "exclusiveMinimum": 0.0, "maximum": LARGEST}, {"const": INFINITE}]}
     ),

@@ -49,15 +49,11 @@ class Stage(StrEnum):
     ALL = "all"
 
 
-def _processor() -> str:
-    """Return a name for this kind of processor: machine code is for one."""
+def _mark(stage: Stage) -> Path:
+    """Return what tells that a stage is compiled, for this kind of processor: machine code is for one."""
     lines = [line for line in processor() if line.startswith(("model name", "flags", "Features"))]
     told = "".join((platform.machine(), platform.processor(), *lines))
-    return f"{zlib.crc32(told.encode()):08x}"
-
-
-def _mark(stage: Stage) -> Path:
-    return folder() / f"{stage}.{_processor()}"
+    return folder() / f"{stage}.{zlib.crc32(told.encode()):08x}"
 
 
 def on_disk(stage: Stage = Stage.FIRST) -> bool:
@@ -174,7 +170,8 @@ def missing() -> bool:
 
 def is_open() -> bool:
     """Return whether they are missing, and the way of this process is not settled yet."""
-    return not (_interprets or _is_loaded()) and missing()
+    settled = _interprets or hasattr(sys.modules.get("solver.jit.way"), "WAY")
+    return not settled and missing()
 
 
 def prepare(cost_of_it: Callable[[], float]) -> None:
@@ -193,10 +190,6 @@ def prepare(cost_of_it: Callable[[], float]) -> None:
         f"stickslip: computed without waiting for the compiler, which runs beside ({told()}) and serves what "
         "is asked next\n"
     )
-
-
-def _is_loaded() -> bool:
-    return hasattr(sys.modules.get("solver.jit.way"), "WAY")
 
 
 def interpret() -> bool:

@@ -12,7 +12,7 @@ import gc
 import multiprocessing
 import os
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 
 from solver.jit.way import WAY, Way
@@ -56,7 +56,8 @@ def compile_together(
     spawning = multiprocessing.get_context("spawn")
     with contextlib.ExitStack() as stack:
         pool = None
-        stack.enter_context(_collecting_rarely())
+        stack.callback(gc.set_threshold, *gc.get_threshold())
+        gc.set_threshold(*_COLLECT)
         if count > 1:
             pool = stack.enter_context(
                 ProcessPoolExecutor(
@@ -69,17 +70,6 @@ def compile_together(
             team.hand_out(calls[1:])
             calls[0]()
             team.finish()
-
-
-@contextlib.contextmanager
-def _collecting_rarely() -> Iterator[None]:
-    """Have garbage collected seldom until the block ends."""
-    before = gc.get_threshold()
-    gc.set_threshold(*_COLLECT)
-    try:
-        yield
-    finally:
-        gc.set_threshold(*before)
 
 
 class _Noted:

@@ -159,12 +159,9 @@ def with_sum(
 
 def _bases(scene: Scene) -> list[tuple[Excitation, float]]:
     """Return each base that moves with each phase of its shares, in the order of their coordinates."""
-    return [(e, phase) for e in scene.excitation if e.base for phase in _phases(e)]
-
-
-def _phases(e: Excitation) -> list[float]:
-    """The phases of its shares, first 0, of what a relative motion is counted from."""
-    return list(dict.fromkeys((0.0, *(phase for *_, phase in (e.base.shares if e.base else ())))))
+    moved = ((e, e.base.shares) for e in scene.excitation if e.base)
+    # First the phase 0, that of what a relative motion is counted from.
+    return [(e, phase) for e, own in moved for phase in dict.fromkeys((0.0, *(phase for *_, phase in own)))]
 
 
 def _base_force(force: Excitation, turn: float, omega: float) -> tuple[float, float]:

@@ -141,6 +141,7 @@ def describe(
     omega = 2.0 * math.pi * frequency_hz
     low, high = _extremes(record)
     max_abs = max(abs(low), abs(high))
+    step_error = abs(max_abs - max(map(abs, _extremes(coarse)))) / (2.0**order - 1.0)
     spectrum = np.fft.rfft(record.x)[: N_HARMONICS + 1] / record.x.size
     harmonics = np.abs(spectrum) * np.array([1.0, *[2.0] * N_HARMONICS])
     return MarchResult(
@@ -160,7 +161,7 @@ def describe(
         periods=periods,
         steps_per_period=steps_per_period,
         drift=drift,
-        error_estimate=_step_error(max_abs, coarse, order) + transient,
+        error_estimate=step_error / (max_abs or 1.0) + transient,
         seconds=math.nan,
     )
 
@@ -199,12 +200,6 @@ def turning_points(x: Real, slopes: Real) -> tuple[Integer, Real, Real]:
     root = np.sqrt(np.maximum(b**2 - 3.0 * a * v0, 0.0))
     s = np.clip(-v0 / (b + np.where(v0 > 0.0, -root, root)), 0.0, 1.0)
     return turning, s, x0 + s * (v0 + s * (b + s * a))
-
-
-def _step_error(max_abs: float, coarse: Record, order: int) -> float:
-    low, high = _extremes(coarse)
-    difference = abs(max_abs - max(abs(low), abs(high))) / (2.0**order - 1.0)
-    return difference / max_abs if max_abs > 0.0 else difference
 
 
 class TransientStatus(Enum):

@@ -107,20 +107,13 @@ def force_in_space(path: SpacePath, tau: Real) -> Real:
         since = (tau - piece.begin) % TURN
         inside = np.full(tau.size, True) if path.settles else since <= piece.end - piece.begin
         here = piece.begin + since[inside]
-        force[:, inside] = (_slipping if piece.motion == SLIP else _sticking)(path, piece, here)
+        if piece.motion == SLIP:
+            way, _ = _ways(directions(path, piece, here))
+            force[:, inside] = path.slider.limit(_at(path.load[None], here)) * way.T
+        else:
+            moved = _at(path.motions, here) - _at(path.motions, np.array([piece.begin]))
+            force[:, inside] = np.array([[piece.tx], [piece.ty]]) + path.slider.pull(moved)
     return force
-
-
-def _sticking(path: SpacePath, piece: Row, tau: Real) -> Real:
-    begin = np.array([piece.begin])
-    moved = _at(path.motions, tau) - _at(path.motions, begin)
-    return np.asarray(np.array([[piece.tx], [piece.ty]]) + path.slider.pull(moved))
-
-
-def _slipping(path: SpacePath, piece: Row, tau: Real) -> Real:
-    angles = directions(path, piece, tau)
-    limit = path.slider.limit(_at(path.load[None], tau)[0])
-    return np.asarray(limit * np.array([np.cos(angles), np.sin(angles)]))
 
 
 def directions(path: SpacePath, piece: Row, tau: Real) -> Real:
@@ -169,7 +162,9 @@ def circle_pieces(path: SpacePath) -> tuple[StatePiece, ...]:
     """Return the states of a contact in space with two or, where the load moves, three motions."""
     kn = None if path.slider.normal_port is None else path.slider.normal_stiffness
     if not path.slider.limit(1.0) or not len(path.pieces):
-        return _without_friction(path, kn)
+        # The normal load alone acts.
+        closed = () if kn is None else gap_pieces(path.load, kn, 0.0)
+        return tuple(spring(piece.begin, piece.end, np.diag([0.0, 0.0, kn or 0.0])) for piece in closed)
     motion = _Motion(path)
     if path.settles:
         row = path.pieces[-1]
@@ -182,18 +177,17 @@ def circle_pieces(path: SpacePath) -> tuple[StatePiece, ...]:
         slips, begin, end = row.motion == SLIP, float(row.begin), float(row.end)
         entry = _entry(motion, kn, row, None if apart else before)
         if slips:
-            pieces.append(_slip(motion, kn, row, entry))
+            panels = path.panels[row.first : row.first + row.count].view(np.recarray)
+            pieces.append(
+                StatePiece(
+                    begin=begin, end=end, rates=_slip_rates(motion, kn, row), entry=entry,
+                    carried=np.zeros((1, 2 if kn is None else 3)),
+                    edges=tuple(float(edge) for edge in panels.end[:-1]),
+                )
+            )  # fmt: skip
         else:
             pieces.append(_stick(path, kn, begin, end, entry))
     return tuple(pieces)
-
-
-def _without_friction(path: SpacePath, kn: float | None) -> tuple[StatePiece, ...]:
-    """Return when the normal load alone acts."""
-    if kn is None:
-        return ()
-    tangent = np.diag([0.0, 0.0, kn])
-    return tuple(spring(piece.begin, piece.end, tangent) for piece in gap_pieces(path.load, kn, 0.0))
 
 
 def _padded(block: Real, kn: float | None, column: Real | None = None) -> Real:
@@ -251,18 +245,6 @@ def _entry(motion: _Motion, kn: float | None, row: Row, before: Row | None) -> S
 def _ways(theta: float | Real) -> tuple[Real, Real]:
     c, s = np.cos(theta), np.sin(theta)
     return np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)
-
-
-def _slip(motion: _Motion, kn: float | None, row: Row, entry: StateEntry) -> StatePiece:
-    path = motion.path
-    begin, end = float(row.begin), float(row.end)
-    panels = path.panels[row.first : row.first + row.count].view(np.recarray)
-    edges = tuple(float(edge) for edge in panels.end[:-1])
-    size = 2 if kn is None else 3
-    return StatePiece(
-        begin=begin, end=end, rates=_slip_rates(motion, kn, row), entry=entry, carried=np.zeros((1, size)),
-        edges=edges,
-    )  # fmt: skip
 
 
 def _slip_rates(motion: _Motion, kn: float | None, row: Row) -> Callable[[Real], Rates]:

@@ -94,14 +94,9 @@ class HistoryContact(RateContact):
         row[columns.KT] = self.stiffness
         row[columns.NODES] = self.nodes(highest)
         row[columns.HISTORY_LAW], row[columns.HISTORY_STATES] = found.number, law.states
-        row[columns.HISTORY_FORM] = self._form
-        row[columns.HISTORY_WAY] = WAYS[found.derivatives]
-
-    @property
-    def _form(self) -> int:
-        law = self.DEFINITION
         bits = {"steps": law.step is not None, "reversals": law.reversals, "alone": law.independent}
-        return sum(_FORM[name] for name, has in bits.items() if has)
+        row[columns.HISTORY_FORM] = sum(_FORM[name] for name, has in bits.items() if has)
+        row[columns.HISTORY_WAY] = WAYS[found.derivatives]
 
     def nodes(self, highest: int) -> int:
         """Return the nodes of a period for harmonics up to `highest`: at least four of the shortest wave."""

@@ -78,9 +78,9 @@ class LawParameter:
         )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class HistoryLaw:
-    """A law given by functions, see `solver.contacts.laws.history.register.register_law`."""
+    """A law given by functions, see `solver.contacts.laws.history.register.register_law`; each is its own."""
 
     name: str = field(kw_only=False)
     parameters: Mapping[str, LawParameter]

@@ -50,40 +50,6 @@ class Ready:
 
 
 @cache
-def _ready(law: _Same) -> Ready:
-    definition, number = law.definition, next(_numbers)
-    made = {place: _made(place, function) for place, function in definition.functions.items()}
-    compiled = all(of_numba for _, of_numba in made.values())
-    kernels = {place: kernel for place, (kernel, _) in made.items()}
-    derivatives = definition.derivatives
-    if derivatives is None:
-        derivatives = Derivatives.BY_HAND if definition.slopes is not None else None
-    if compiled and derivatives in (None, Derivatives.COMPLEX_STEP):
-        waves = _complex_kernels(definition)
-        allowed = waves is not None and (derivatives is not None or _agree(definition, kernels, waves))
-        if waves is not None and allowed:
-            kernels |= waves
-            derivatives = Derivatives.COMPLEX_STEP
-    if derivatives is None or (derivatives is not Derivatives.BY_HAND and kernels.keys() == made.keys()):
-        derivatives = Derivatives.DIFFERENCES
-    for place, kernel in kernels.items():
-        TABLES[place].put(number, kernel)
-    return Ready(number=number, derivatives=derivatives, compiled=compiled, kept=tuple(kernels.values()))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Same:
-    """A definition as a key: what it is, not what it equals."""
-
-    definition: HistoryLaw
-
-    def __hash__(self) -> int:
-        return id(self.definition)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and other.definition is self.definition
-
-
 def ready(law: HistoryLaw) -> Ready:
     """Return a law ready to be called; compiled or loaded when first asked for.
 
@@ -92,7 +58,23 @@ def ready(law: HistoryLaw) -> Ready:
     SettingError
         A function does not return what it must.
     """
-    return _ready(_Same(law))
+    number = next(_numbers)
+    made = {place: _made(place, function) for place, function in law.functions.items()}
+    compiled = all(of_numba for _, of_numba in made.values())
+    kernels = {place: kernel for place, (kernel, _) in made.items()}
+    derivatives = law.derivatives
+    if derivatives is None and law.slopes is not None:
+        derivatives = Derivatives.BY_HAND
+    if compiled and derivatives in (None, Derivatives.COMPLEX_STEP):
+        waves = _complex_kernels(law)
+        if waves is not None and (derivatives is not None or _agree(law, kernels, waves)):
+            kernels |= waves
+            derivatives = Derivatives.COMPLEX_STEP
+    if derivatives is None or (derivatives is not Derivatives.BY_HAND and kernels.keys() == made.keys()):
+        derivatives = Derivatives.DIFFERENCES
+    for place, kernel in kernels.items():
+        TABLES[place].put(number, kernel)
+    return Ready(number=number, derivatives=derivatives, compiled=compiled, kept=tuple(kernels.values()))
 
 
 def _made(place: str, function: Callable[..., Any]) -> tuple[Any, bool]:
