@@ -13,8 +13,7 @@ from solver.results.told import Piece
 from solver.results.views import Views
 
 if TYPE_CHECKING:
-    from optim.identification.information import Untold
-    from optim.identification.next_measurement import Candidate
+    from optim.identification.information import Candidate, Untold
 
 
 class IdentifyStatus(Enum):

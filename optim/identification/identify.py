@@ -12,9 +12,16 @@ import numpy as np
 from optim.identification.data.response import ResponseRun
 from optim.identification.fit import MOST_STARTS, STARTS, LocalFit, Noise, Runs, Searched, search
 from optim.identification.identification_result import Estimate, Identification, IdentifyStatus, NotReached
-from optim.identification.information import UNIFORM, Information, information, strong_correlations, untold
+from optim.identification.information import (
+    UNIFORM,
+    Information,
+    information,
+    rank,
+    read_candidates,
+    strong_correlations,
+    untold,
+)
 from optim.identification.model_check import doubts
-from optim.identification.next_measurement import rank, read_candidates
 from optim.identification.reading import Given, read_data
 from optim.identification.unknowns import Unknowns, read_unknowns
 from optim.problem.checks import DataError, DesignError, is_number

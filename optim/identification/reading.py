@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from optim.identification.data.measured import KINDS, DataKind, MeasuredRows, known_words
-from optim.identification.data.measured_table import Table, check_numbers, runs_of
-from optim.identification.data.measured_units import Dimension, unit_of
+from optim.identification.data.measured_table import Dimension, Table, check_numbers, runs_of, unit_of
 from optim.identification.readers.csv_text import FORMAT as CSV
 from optim.identification.readers.csv_text import FromText, read_text
 from optim.identification.readers.data_readers import (
@@ -24,8 +23,7 @@ from optim.identification.readers.data_readers import (
     read_head,
     table_of,
 )
-from optim.identification.readers.encodings import text_of
-from optim.identification.readers.headings import Choice
+from optim.identification.readers.text_layout import Choice, text_of
 from optim.problem.checks import DataError
 from solver.errors import SettingError
 from solver.scene.parameter_paths import find_parameter

@@ -29,9 +29,8 @@ from optim.problem.uncertainty_input import check_settings, read_uncertain
 from optim.problem.uncertainty_set import Scenario
 from optim.results.design_result import DesignResult, DesignStatus, OnBest
 from optim.results.doubts import WELL_KNOWN
-from optim.robust.cutting_sets import CLOSED, SearchProgress, cutting_sets, sampled
 from optim.robust.robust_result import RobustResult, RobustStatus, Side, Spread
-from optim.robust.robust_search import RobustSearch
+from optim.robust.robust_search import CLOSED, RobustSearch, SearchProgress, cutting_sets, sampled
 from optim.robust.scenarios import Outcome, rank_of
 from optim.robust.worst_case import MOST_BESIDES, Aspect, UnknownScenarioError
 from optim.search import solve_problem

@@ -18,7 +18,7 @@ from pydantic.fields import FieldInfo
 from optim.criteria.criterion import criteria, limit_keys
 from optim.criteria.key import Key, Option
 from optim.identification.data.measured import data_kinds
-from optim.identification.data.measured_units import known_units
+from optim.identification.data.measured_table import known_units
 from optim.identification.readers.data_readers import data_formats
 from optim.problem.checks import MethodWord, ScalingWord
 from optim.problem.problem_keys import OPTIONS, ROBUST, CaseRequest, DesignKeys, FrontKeys, options

@@ -359,7 +359,7 @@ def test_without_any_response_it_says_so() -> None:
 
 @pytest.mark.long
 def test_a_search_that_runs_out_says_how_far_it_came(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("optim.robust.cutting_sets.MOST_CUTS", 1)
+    monkeypatch.setattr("optim.robust.robust_search.MOST_CUTS", 1)
     open_gap = optim.robust_design(
         TWO, uncertain={"half_axes": {"damper.mu": 0.3, "damper.kt": 0.2}, "relative": True}, variables=N0,
         samples=2, harmonics=3,

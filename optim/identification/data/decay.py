@@ -33,10 +33,16 @@ from typing import Annotated, ClassVar
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
-from optim.identification.data.measured_curve import CurveRun, columns_of
-from optim.identification.data.measured_table import Table, check_monotone
-from optim.identification.data.measured_units import Dimension
+from optim.identification.data.measured import (
+    Column,
+    CurveRun,
+    DataKind,
+    MeasuredRows,
+    Predicted,
+    RunModel,
+    columns_of,
+)
+from optim.identification.data.measured_table import Dimension, Table, check_monotone
 from optim.identification.data.mode import SHARPER, WORDS, FollowedMode, checked_mode
 from optim.problem.variables import Real
 from solver.modes.at_amplitudes import ModePoints

@@ -15,8 +15,7 @@ from typing import Annotated
 import numpy as np
 
 from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
-from optim.identification.data.measured_table import Table, check_monotone
-from optim.identification.data.measured_units import Dimension
+from optim.identification.data.measured_table import Dimension, Table, check_monotone
 from optim.problem.checks import DataError
 from optim.problem.variables import Real
 from solver.balance.balance import build

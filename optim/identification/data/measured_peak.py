@@ -14,10 +14,17 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
-from optim.identification.data.measured_curve import CurveRun, check_level, columns_of
-from optim.identification.data.measured_table import Table
-from optim.identification.data.measured_units import Dimension
+from optim.identification.data.measured import (
+    Column,
+    CurveRun,
+    DataKind,
+    MeasuredRows,
+    Predicted,
+    RunModel,
+    check_level,
+    columns_of,
+)
+from optim.identification.data.measured_table import Dimension, Table
 from optim.identification.data.response import measured_dof, observing_dof
 from optim.problem.checks import DataError
 from optim.problem.variables import Real

@@ -13,10 +13,17 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
-from optim.identification.data.measured_curve import CurveRun, columns_of, whole_word
-from optim.identification.data.measured_table import Table, check_monotone, check_sign
-from optim.identification.data.measured_units import Dimension
+from optim.identification.data.measured import (
+    Column,
+    CurveRun,
+    DataKind,
+    MeasuredRows,
+    Predicted,
+    RunModel,
+    columns_of,
+    whole_word,
+)
+from optim.identification.data.measured_table import Dimension, Table, check_monotone, check_sign
 from optim.problem.variables import Real
 from solver.errors import SettingError
 from solver.modes.at_amplitudes import ModePoints, mode_at_amplitudes

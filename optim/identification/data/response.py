@@ -15,10 +15,8 @@ from typing import Annotated
 
 import numpy as np
 
-from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
-from optim.identification.data.measured_curve import FLOOR
-from optim.identification.data.measured_table import Table, check_monotone, check_sign
-from optim.identification.data.measured_units import Dimension
+from optim.identification.data.measured import FLOOR, Column, DataKind, MeasuredRows, Predicted, RunModel
+from optim.identification.data.measured_table import Dimension, Table, check_monotone, check_sign
 from optim.problem.checks import DataError
 from optim.problem.variables import Real
 from solver.balance.balance import build

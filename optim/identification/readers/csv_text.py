@@ -15,10 +15,16 @@ import numpy as np
 
 from optim.identification.data.measured_table import Table, split_head
 from optim.identification.readers.data_readers import DataFormat, Head, complex_apart, read_head, table_of
-from optim.identification.readers.encodings import text_of
-from optim.identification.readers.headings import LEFT_OUT, Choice, contradiction
 from optim.identification.readers.number_texts import COMMA, DECIMAL, POINT, columns_of
-from optim.identification.readers.text_layout import Layout, heading_unit, layout_of
+from optim.identification.readers.text_layout import (
+    LEFT_OUT,
+    Choice,
+    Layout,
+    contradiction,
+    heading_unit,
+    layout_of,
+    text_of,
+)
 from optim.problem.checks import DataError
 from optim.problem.variables import Real
 

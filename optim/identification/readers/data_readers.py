@@ -15,8 +15,7 @@ from typing import Annotated
 import numpy as np
 
 from optim.identification.data.measured import known_columns, known_words
-from optim.identification.data.measured_table import Table, split_head
-from optim.identification.data.measured_units import Scaling, Unit, unit_of, wanted_unit
+from optim.identification.data.measured_table import Scaling, Table, Unit, split_head, unit_of, wanted_unit
 from optim.problem.checks import DataError
 from optim.problem.variables import Real
 from solver.errors import Place

@@ -16,10 +16,9 @@ from typing import Annotated
 
 import numpy as np
 
-from optim.identification.data.measured_table import Table
-from optim.identification.data.measured_units import Dimension, Unit, unit_of, wanted_unit
+from optim.identification.data.measured_table import Dimension, Table, Unit, unit_of, wanted_unit
 from optim.identification.readers.data_readers import DataFormat, complex_apart, read_head, table_of
-from optim.identification.readers.encodings import decoded
+from optim.identification.readers.text_layout import decoded
 from optim.problem.checks import DataError
 from optim.problem.variables import Real
 from solver.jit.fourier import Complex

@@ -28,7 +28,7 @@ def read_measurements(scene: Scene, files: Sequence[Mapping[str, Any]]) -> dict[
     `detail`.
     """
     from optim.identification.readers.csv_text import read_text
-    from optim.identification.readers.headings import Choice
+    from optim.identification.readers.text_layout import Choice
     from optim.identification.reading import read_data
 
     paths = frozenset(scene.parameter_paths())
@@ -60,8 +60,7 @@ def look_at(scene: Scene, files: Sequence[Mapping[str, str]]) -> dict[str, Any]:
     `quantities` with the `units` that each may be in; `issues` as of `read_measurements`.
     """
     from optim.identification.data.measured import known_columns
-    from optim.identification.readers.headings import FORCE, guesses, units_for
-    from optim.identification.readers.text_layout import layout_of
+    from optim.identification.readers.text_layout import FORCE, guesses, layout_of, units_for
     from optim.problem.checks import DataError
 
     paths = frozenset(scene.parameter_paths())

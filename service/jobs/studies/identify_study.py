@@ -154,6 +154,6 @@ class Identify(Measured):
 
     def look_further(self, scene: Scene, runs: tuple[MeasuredRows, ...], unknowns: Unknowns) -> None:
         """Raise what is wrong with the candidates."""
-        from optim.identification.next_measurement import read_candidates
+        from optim.identification.information import read_candidates
 
         read_candidates(scene, runs, unknowns, self.candidates)

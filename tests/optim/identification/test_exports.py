@@ -8,9 +8,7 @@ import pytest
 
 import solver
 from optim.identification.readers.csv_text import read_text
-from optim.identification.readers.encodings import text_of
-from optim.identification.readers.headings import Choice, guesses
-from optim.identification.readers.text_layout import layout_of
+from optim.identification.readers.text_layout import Choice, guesses, layout_of, text_of
 from optim.identification.reading import read_data, with_columns
 from optim.problem.checks import DataError
 

@@ -15,9 +15,7 @@ from measured_files import HERTZ, MOTION, UNITS, Measured, Text, Universal
 import solver
 from optim.identification.data.response import ResponseRun
 from optim.identification.readers.csv_text import read_text
-from optim.identification.readers.encodings import decoded
-from optim.identification.readers.headings import Choice, guesses
-from optim.identification.readers.text_layout import layout_of
+from optim.identification.readers.text_layout import Choice, decoded, guesses, layout_of
 from optim.identification.reading import job_tables, read_data, with_columns
 from optim.problem.checks import DataError
 from solver.errors import SceneError
