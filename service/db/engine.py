@@ -17,7 +17,6 @@ import time
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -123,7 +122,10 @@ def _on_connect(
     def configure(connection: DBAPIConnection, record: ConnectionPoolEntry) -> None:
         connection.isolation_level = None
         if seconds is not None:
-            connection.set_progress_handler(partial(_overdue, record.info), _STEPS_BETWEEN_LOOKS)
+            info = record.info
+            connection.set_progress_handler(
+                lambda: time.monotonic() > info.get(_DEADLINE, math.inf), _STEPS_BETWEEN_LOOKS
+            )
         cursor = connection.cursor()
         cursor.execute(f"PRAGMA busy_timeout = {int((seconds or BUSY_TIMEOUT_SECONDS) * 1000)}")
         cursor.execute("PRAGMA journal_mode = WAL")
@@ -134,12 +136,6 @@ def _on_connect(
         cursor.close()
 
     return configure
-
-
-def _overdue(info: dict[str, Any]) -> bool:
-    """Whether the transaction of an SQLite connection takes too long."""
-    deadline: float = info.get(_DEADLINE, math.inf)
-    return time.monotonic() > deadline
 
 
 def _begin_with(statement: str, seconds: float | None = None) -> Callable[[Connection], None]:

@@ -66,35 +66,17 @@ def _create(url: str, connect_seconds: int = _CONNECT_SECONDS, **pool: Any) -> E
         ) from error
 
 
-def _limit_waits(connection: DBAPIConnection, _record: ConnectionPoolEntry) -> None:
-    """No statement waits longer for a lock than SQLite's would."""
-    cursor = connection.cursor()
-    cursor.execute(f"SET lock_timeout = {int(_WAIT_SECONDS * 1000)}")
-    cursor.close()
-    connection.commit()
+def _told(*statements: str) -> Callable[[DBAPIConnection, ConnectionPoolEntry], None]:
+    """For SQLAlchemy's event `connect`: what every new connection is told."""
 
-
-def _join_services(connection: DBAPIConnection, _record: ConnectionPoolEntry) -> None:
-    """Hold the shared lock as long as the connection lives; waits while tables change."""
-    cursor = connection.cursor()
-    cursor.execute(f"SELECT pg_advisory_lock_shared({_SERVICES})")
-    cursor.close()
-    connection.commit()
-
-
-def _limit(seconds: float) -> Callable[[DBAPIConnection, ConnectionPoolEntry], None]:
-    """No statement takes longer than so long [s], waiting for locks included."""
-
-    def limit(connection: DBAPIConnection, _record: ConnectionPoolEntry) -> None:
+    def tell(connection: DBAPIConnection, _record: ConnectionPoolEntry) -> None:
         cursor = connection.cursor()
-        cursor.execute(f"SET lock_timeout = {int(seconds * 1000)}")
-        cursor.execute(f"SET statement_timeout = {int(seconds * 1000)}")
-        # Starting parallel workers takes longer than a page should.
-        cursor.execute("SET max_parallel_workers_per_gather = 0")
+        for statement in statements:
+            cursor.execute(statement)
         cursor.close()
         connection.commit()
 
-    return limit
+    return tell
 
 
 def _require_silence(connection: Any, _record: ConnectionPoolEntry, _proxy: object) -> None:
@@ -114,15 +96,6 @@ def _execute(cursor: Any, statement: str, parameters: Any, context: Any) -> bool
         return False
     cursor.execute(statement, parameters, prepare=False)
     return True
-
-
-def _connect_bounded(seconds: float) -> Callable[[Any, Any, list[Any], dict[str, Any]], Any]:
-    """For SQLAlchemy's event `do_connect`."""
-
-    def connect(_dialect: Any, _record: Any, words: list[Any], options: dict[str, Any]) -> Any:
-        return bounded_connect(seconds)(*words, **options)
-
-    return connect
 
 
 def bounded_connect(seconds: float) -> Callable[..., Any]:
@@ -173,9 +146,18 @@ def service_engine(url: str, connections: int, seconds: float) -> Engine:
     engine = _create(
         url, connect_seconds=patience, pool_size=connections, max_overflow=0, pool_timeout=seconds
     )
-    event.listen(engine, "do_connect", _connect_bounded(seconds))
-    event.listen(engine, "connect", _limit(seconds))
-    event.listen(engine, "connect", _join_services)
+    connect = bounded_connect(seconds)
+    event.listen(engine, "do_connect", lambda _dialect, _record, words, options: connect(*words, **options))
+    most = int(seconds * 1000)
+    told = _told(
+        f"SET lock_timeout = {most}",
+        f"SET statement_timeout = {most}",
+        # Starting parallel workers takes longer than a page should.
+        "SET max_parallel_workers_per_gather = 0",
+        # Held as long as the connection lives; waits while tables change.
+        f"SELECT pg_advisory_lock_shared({_SERVICES})",
+    )
+    event.listen(engine, "connect", told)
     event.listen(engine, "checkout", _require_silence)
     event.listen(engine, "do_execute", _execute)
     return engine
@@ -224,7 +206,8 @@ def looking(engine: Engine) -> Engine:
 def migration_engine(url: str) -> Engine:
     """An engine for changes of the tables, outside of the services' lock."""
     engine = _create(url, poolclass=NullPool)
-    event.listen(engine, "connect", _limit_waits)
+    # No statement waits longer for a lock than SQLite's would.
+    event.listen(engine, "connect", _told(f"SET lock_timeout = {int(_WAIT_SECONDS * 1000)}"))
     return engine
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import logging
 from collections import defaultdict
-from collections.abc import AsyncIterator, MutableMapping
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import Any
 
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
@@ -80,7 +79,8 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
             "metrics": False,
             "logs": False,
             "auto_configure": False,
-            "exclude": _by_link,
+            # One may have the secret of a link in its address, which no trace is to tell.
+            "exclude": lambda scope: by_link(scope.get("path", "")),
         },
     )
     _guard(app, service)
@@ -96,11 +96,6 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
         _offer_login(app, service)
     openapi.install(app, service.registry)
     return app
-
-
-def _by_link(scope: MutableMapping[str, Any]) -> bool:
-    """Whether a request may have the secret of a link in its address, which no trace is to tell."""
-    return by_link(scope.get("path", ""))
 
 
 _ROUTERS = (

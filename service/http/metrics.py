@@ -83,11 +83,8 @@ class _JobsCollector(Collector):
         pruned = CounterMetricFamily(
             "stickslip_pruned", "What retention deleted since the service began.", labels=("what",)
         )
-        gone = self._service.retention.pruned
-        pruned.add_metric(("jobs",), float(gone.jobs))
-        pruned.add_metric(("sweeps",), float(gone.sweeps))
-        pruned.add_metric(("uploads",), float(gone.uploads))
-        pruned.add_metric(("projects",), float(gone.projects))
+        for what in ("jobs", "sweeps", "uploads", "projects"):
+            pruned.add_metric((what,), float(getattr(self._service.retention.pruned, what)))
         yield pruned
 
 
@@ -110,7 +107,7 @@ class RequestMetrics:
         try:
             await self._app(scope, receive, watched)
         finally:
-            route = _route(scope)
+            route = str(getattr(scope.get("route"), "path", "none"))  # the template of the one that answered
             method = scope["method"] if scope["method"] in _METHODS else "other"
             if status in REFUSALS:
                 self._metrics.refused.count(scope["state"].get(OWNER, NO_KEY), status)
@@ -119,11 +116,6 @@ class RequestMetrics:
 
 
 _METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
-
-
-def _route(scope: Scope) -> str:
-    """Return the template of the route that answered, ``none`` for a request that matched none."""
-    return str(getattr(scope.get("route"), "path", "none"))
 
 
 router = APIRouter(tags=["health"])

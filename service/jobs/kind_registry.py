@@ -154,10 +154,6 @@ def _some(text: str) -> str:
     return text
 
 
-def _each_once(tags: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(sorted(set(tags)))
-
-
 RunName = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_one_line)]
 ProjectName = Annotated[
     str, Field(min_length=1, max_length=LONGEST_NAME), AfterValidator(_one_line), AfterValidator(_some)
@@ -166,7 +162,9 @@ Notes = Annotated[str, Field(max_length=LONGEST_NOTES), AfterValidator(_lines)]
 Tag = Annotated[
     str, Field(min_length=1, max_length=LONGEST_TAG), AfterValidator(_one_line), AfterValidator(_some)
 ]
-Tags = Annotated[tuple[Tag, ...], Field(max_length=MOST_TAGS), AfterValidator(_each_once)]
+Tags = Annotated[
+    tuple[Tag, ...], Field(max_length=MOST_TAGS), AfterValidator(lambda tags: tuple(sorted(set(tags))))
+]
 
 
 class JobRequest(BaseModel):

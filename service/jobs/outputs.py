@@ -52,14 +52,10 @@ class Progress(Protocol):
 class Silent:
     """Progress that nobody watches."""
 
-    def __call__(self, fraction: float, points: int) -> None:
+    def __call__(self, *_: object, **__: object) -> None:
         """Say nothing."""
 
-    def found(self, points: Sequence[Point]) -> None:
-        """Say nothing."""
-
-    def best(self, found: Best) -> None:
-        """Say nothing."""
+    found = best = __call__
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -316,8 +316,5 @@ def _short(value: object) -> str:
     # What is large is not written out to be cut.
     if isinstance(value, str | list | tuple | dict) and len(value) > _SHOWN:
         value = value[:_SHOWN] if isinstance(value, str | list | tuple) else f"an object of {len(value)} keys"
-    return _cut(repr(value))
-
-
-def _cut(text: str) -> str:
+    text = repr(value)
     return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."

@@ -229,7 +229,11 @@ class Service:
         """
         kind, request = self.registry.parse(body)
         seconds = self._seconds_limit(request, caller)
-        self._require_priority(request, caller)
+        most = highest_priority(caller, self.settings)
+        if request.priority > most:
+            raise InvalidRequestError.of(
+                ("priority",), f"must be at most {most} with this key", request.priority
+            )
         self.storage.require(caller)
         if found is None:
             memory, work = self.settings.worker_memory_bytes or None, caller.limits.work
@@ -262,13 +266,6 @@ class Service:
             if self._notices is not None:
                 self._notices.tell(pg_notify.ACCEPTED)
         return row, inserted
-
-    def _require_priority(self, request: JobRequest, caller: Caller) -> None:
-        most = highest_priority(caller, self.settings)
-        if request.priority > most:
-            raise InvalidRequestError.of(
-                ("priority",), f"must be at most {most} with this key", request.priority
-            )
 
     def _seconds_limit(self, request: JobRequest, caller: Caller) -> float | None:
         """The longest time an attempt may take, if the request or the key says so [s]."""

@@ -27,14 +27,6 @@ _LONG = 3.0
 _RETRY_SECONDS = 2
 
 
-def _everybody(_owner: str) -> None:
-    """Nobody is refused."""
-
-
-def _unwatched(_seconds: float) -> None:
-    """Nobody looks."""
-
-
 class Lane:
     """Some threads. All but the work itself happens on one event loop, so nothing here needs a lock.
 
@@ -47,9 +39,11 @@ class Lane:
     waited : told how long each call waited [s].
     """
 
-    def __init__(self, threads: int, seconds: float, waited: Callable[[float], object] = _unwatched) -> None:
+    def __init__(
+        self, threads: int, seconds: float, waited: Callable[[float], object] = lambda _seconds: None
+    ) -> None:
         self._waited = waited
-        self.require: Callable[[str], None] = _everybody
+        self.require: Callable[[str], None] = lambda _owner: None
         self._seconds = seconds
         self._free = threads
         self._threads = threads

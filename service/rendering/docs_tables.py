@@ -6,6 +6,7 @@ is written as a whole.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Container, Iterable, Mapping
 from functools import partial
 from pathlib import Path
@@ -94,7 +95,7 @@ def _type(schema: Mapping[str, Any]) -> str:
         return " | ".join(map(_type, schema["anyOf"]))
     words = tuple(schema.get("enum", ())) or ((schema["const"],) if "const" in schema else ())
     if words:
-        return _WORDS.get(words) or f"Literal[{', '.join(map(_in_quotes, words))}]"
+        return _WORDS.get(words) or f"Literal[{', '.join(map(json.dumps, words))}]"
     if schema.get("type") == "array":
         return f"Sequence[{_type(schema['items'])}]"
     if "$ref" in schema or schema["type"] == "object":
@@ -102,10 +103,6 @@ def _type(schema: Mapping[str, Any]) -> str:
         known = next((one for one in values if isinstance(one, Mapping)), None)
         return f"Mapping[str, {'object' if known is None else _type(known)}]"
     return _NUMBERS[schema["type"]]
-
-
-def _in_quotes(word: str) -> str:
-    return f'"{word}"'
 
 
 _WRITTEN = {"scene": "`SCENE`", "set": "`--set PATH=VALUE`"}

@@ -155,7 +155,7 @@ def csv_of_items(items: Iterable[Mapping[str, Any]]) -> bytes:
     """A list of answers as a table: one row each, nested keys joined by a dot, without links."""
     rows = [dict(_flat(item)) for item in items]
     columns = list(dict.fromkeys(name for row in rows for name in row))
-    return _csv(columns, ([row.get(name) for name in columns] for row in rows))
+    return csv_text(columns, ([row.get(name) for name in columns] for row in rows)).encode()
 
 
 def _flat(item: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, Any]]:
@@ -164,15 +164,8 @@ def _flat(item: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, Any]
             if key not in _NOT_OF_LISTS:
                 yield from _flat(value, f"{prefix}{key}.")
         elif key not in _NOT_OF_LISTS:
-            yield prefix + key, "; ".join(map(str, value)) if _texts(value) else value
-
-
-def _texts(value: Any) -> bool:
-    return isinstance(value, list) and all(isinstance(one, str) for one in value)
-
-
-def _csv(columns: Sequence[str], rows: Iterable[Iterable[Any]]) -> bytes:
-    return csv_text(columns, rows).encode()
+            texts = isinstance(value, list) and all(isinstance(one, str) for one in value)
+            yield prefix + key, "; ".join(value) if texts else value
 
 
 _COLUMNS = ("parameter", "amplitude", "half_peak_to_peak", "mean", "residual")

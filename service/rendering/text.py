@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING, Any
 from solver.results.told import Block, ResultTable, Summary
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from service.jobs.kind_registry import Json, Tell
 
 _PIPE_WIDTH = 120
@@ -61,6 +59,7 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
     What identifies a thing, in a column `id`, stands whole on one line, to be copied: other columns fold.
     """
     from rich.box import SIMPLE_HEAD
+    from rich.console import Console
     from rich.table import Table
 
     made = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
@@ -71,7 +70,8 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
         made.add_column(column, justify="right" if right else "left", overflow="fold", min_width=whole)
     for row in listed:
         made.add_row(*row)
-    console = _console()
+    width = None if sys.stdout.isatty() else _PIPE_WIDTH
+    console = Console(highlight=False, markup=False, emoji=False, width=width)
     console.print(title, style="bold")
     console.print(made)
 
@@ -118,10 +118,3 @@ def _styled(text: str, style: str) -> str:
     """Text in a style, where somebody watches a terminal that has styles and wants them."""
     plain = not sys.stdout.isatty() or "NO_COLOR" in os.environ or os.environ.get("TERM") == "dumb"
     return text if plain else f"\x1b[{style}m{text}\x1b[0m"
-
-
-def _console() -> Console:
-    from rich.console import Console
-
-    width = None if sys.stdout.isatty() else _PIPE_WIDTH
-    return Console(highlight=False, markup=False, emoji=False, width=width)

@@ -88,13 +88,13 @@ def problem(
 
 def install(app: FastAPI) -> None:
     """Have every error of `app` answered with a problem document."""
-    app.add_exception_handler(errors.ServiceError, _service_error)
+    app.add_exception_handler(errors.ServiceError, _known)
     app.add_exception_handler(RequestValidationError, _validation_error)
     app.add_exception_handler(HTTPException, _http_error)
     app.add_exception_handler(ClientDisconnect, _gone)
     app.add_exception_handler(DataError, _unstorable)
-    app.add_exception_handler(OperationalError, _database_away)
-    app.add_exception_handler(PoolTimeoutError, _database_away)
+    for away in AWAY:
+        app.add_exception_handler(away, _known)
     app.add_middleware(_Boundary)
 
 
@@ -137,16 +137,18 @@ AWAY = (OperationalError, PoolTimeoutError)
 
 
 def answered(request: Request, error: Exception) -> JSONResponse:
-    """The problem document of an error that no route raised."""
+    """The problem document of the service's own errors, and of a database that does not answer."""
     if isinstance(error, errors.ServiceError):
         return service_problem(request, error)
-    return _no_database(request, error)
+    # It is away, full or locked: nothing was written.
+    log.error("%s %s: the database failed: %s", request.method, request.url.path, error)
+    detail = "the database does not answer at present; nothing was written, try again later"
+    headers = {"Retry-After": str(_RETRY_SECONDS)}
+    return problem(request, 503, "database-away", "The database does not answer", detail, headers=headers)
 
 
-async def _service_error(request: Request, error: Exception) -> JSONResponse:
-    if not isinstance(error, errors.ServiceError):
-        return _unexpected(request, error)
-    return service_problem(request, error)
+async def _known(request: Request, error: Exception) -> JSONResponse:
+    return answered(request, error)
 
 
 async def _gone(request: Request, _error: Exception) -> JSONResponse:
@@ -160,18 +162,6 @@ async def _unstorable(request: Request, error: Exception) -> JSONResponse:
     status, slug, title = STATUS[errors.InvalidRequestError]
     detail = "the request holds a character or a number that cannot be stored or looked for"
     return problem(request, status, slug, title, detail)
-
-
-async def _database_away(request: Request, error: Exception) -> JSONResponse:
-    """The database does not answer, is full or locked: nothing was written."""
-    return _no_database(request, error)
-
-
-def _no_database(request: Request, error: Exception) -> JSONResponse:
-    log.error("%s %s: the database failed: %s", request.method, request.url.path, error)
-    detail = "the database does not answer at present; nothing was written, try again later"
-    headers = {"Retry-After": str(_RETRY_SECONDS)}
-    return problem(request, 503, "database-away", "The database does not answer", detail, headers=headers)
 
 
 async def _validation_error(request: Request, error: Exception) -> JSONResponse:

@@ -105,6 +105,8 @@ def comparison(service: Service, a: str, b: str, caller: Caller) -> Comparison:
     """What differs between two runs of which the caller sees both (NotFoundError if not)."""
     rows = [service.runs.seen(one, caller.sees) for one in (a, b)]
     specs = [_inputs(service, row) for row in rows]
+    ours, theirs = (service.jobs.figures(row.job.result_of or row.job.id) for row in rows)
+    names = dict.fromkeys((*ours, *theirs))
     found = differences(*specs)
     told = [InputDifference(part=d.part, path=d.path, a=d.a, b=d.b) for d in islice(found, _MOST_INPUTS)]
     return Comparison(
@@ -112,7 +114,7 @@ def comparison(service: Service, a: str, b: str, caller: Caller) -> Comparison:
         b=RunAnswer.of_run(rows[1]),
         inputs=told,
         more_inputs=sum(1 for _ in islice(found, _MOST_COUNTED)),
-        results=_beside(*(_results(service, row) for row in rows)),
+        results=[Figure(name=name, a=ours.get(name), b=theirs.get(name)) for name in names],
     )
 
 
@@ -120,15 +122,6 @@ def _inputs(service: Service, row: RunRow) -> dict[str, Any]:
     """What a run computes: its kind, its scene with every value, its settings."""
     spec = service.jobs.spec(row.job.id)
     return {"kind": row.job.kind, **{key: value for key, value in spec.items() if key != CHECKED_BY}}
-
-
-def _results(service: Service, row: RunRow) -> dict[str, Any]:
-    """The figures of a run; none if it has no result."""
-    return service.jobs.figures(row.job.result_of or row.job.id)
-
-
-def _beside(a: dict[str, Any], b: dict[str, Any]) -> list[Figure]:
-    return [Figure(name=name, a=a.get(name), b=b.get(name)) for name in dict.fromkeys((*a, *b))]
 
 
 _FREQUENCY = "frequency"

@@ -65,17 +65,10 @@ class Sink(Protocol):
 class Unwatched:
     """The part of a `Sink` whose attempts nobody watches, and which have no later attempt."""
 
-    def progress(self, attempt: Attempt, fraction: float, points: int) -> None:
+    def _nobody(self, *_: object, **__: object) -> None:
         """Nobody watches."""
 
-    def found(self, attempt: Attempt, points: Sequence[Point]) -> None:
-        """Nobody watches."""
-
-    def best(self, attempt: Attempt, found: Best) -> None:
-        """Nobody watches."""
-
-    def kept(self, attempt: Attempt, pieces: Sequence[ResultPiece], *, anew: bool) -> None:
-        """There is no later attempt."""
+    progress = found = best = kept = _nobody
 
 
 class Executor(Protocol):

@@ -457,7 +457,8 @@ class Slot(threading.Thread):
             if self._held:
                 self._begin(child, self._held[0], now)
             elif self._withdrawn:
-                self._expect_withdrawn(child)
+                # One taken back too late is computed all the same: it has the grace to notice.
+                self._kill_after_grace(child, min(self._withdrawn))
         self._give_back(leftover)
         self._executor.tell_room()
         self._executor.room()
@@ -470,10 +471,6 @@ class Slot(threading.Thread):
             self._send(child, held)
         if held.stopping:
             self._enforce(held)
-
-    def _expect_withdrawn(self, child: Child) -> None:
-        """A task taken back too late is computed all the same: it has the grace to notice."""
-        self._kill_after_grace(child, min(self._withdrawn))
 
     def _lose_all(self, reason: str, ended_by: int | None = None) -> None:
         """The process is gone: what it computed is lost, what waited behind goes back to the queue."""

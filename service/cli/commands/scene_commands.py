@@ -41,13 +41,13 @@ def _problem() -> dict[str, Any]:
     found["properties"] = {**front["properties"], **found["properties"]}
     # The scene may be the command's argument instead.
     found["required"] = [key for key in found.get("required", []) if key != "scene"]
-    found["properties"]["scene"] = _scene_of_a_file(found["properties"]["scene"])
+    # Beside names and objects, the name of a scene file.
+    either, words = (
+        [{"type": "string"}, {"type": "object"}],
+        found["properties"]["scene"].get("description", ""),
+    )
+    found["properties"]["scene"] = {"anyOf": either, "description": words}
     return {"$schema": DIALECT, "title": "stickslip design problem", **found}
-
-
-def _scene_of_a_file(scene: dict[str, Any]) -> dict[str, Any]:
-    """Beside names and objects, the name of a scene file."""
-    return {"anyOf": [{"type": "string"}, {"type": "object"}], "description": scene.get("description", "")}
 
 
 def _job() -> dict[str, Any]:

@@ -125,16 +125,11 @@ def with_what_was_kept(database: Database, attempt: Attempt) -> Attempt:
     was damaged here and what was damaged on the way, and the thread that hands out jobs is not held up by the
     digest of a quarter of a gigabyte.
     """
-    with database.reading() as connection:
-        saved = _pieces_of(connection, attempt.job_id)
-    return replace(attempt, saved=saved) if saved else replace(attempt, progress=0.0, points=0)
-
-
-def _pieces_of(connection: Connection, job_id: str) -> tuple[ResultPiece, ...]:
-    """The pieces of a job's checkpoint in their order."""
     query = select(Checkpoint.part, Checkpoint.sha256, Checkpoint.data)
-    rows = connection.execute(query.where(Checkpoint.job_id == job_id).order_by(Checkpoint.part))
-    return tuple(ResultPiece(part=row.part, sha256=row.sha256, data=row.data) for row in rows)
+    query = query.where(Checkpoint.job_id == attempt.job_id).order_by(Checkpoint.part)
+    with database.reading() as connection:
+        saved = tuple(ResultPiece(**row) for row in connection.execute(query).mappings())
+    return replace(attempt, saved=saved) if saved else replace(attempt, progress=0.0, points=0)
 
 
 def drop_checkpoint(connection: Connection, job_id: str) -> None:

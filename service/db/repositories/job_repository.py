@@ -118,7 +118,9 @@ class JobRepository:
             return known, False
         # Before anything is written: what others do in the same transaction is kept if this is refused.
         require_project(connection, new.words.project, new.owner)
-        source = None if new.fresh else self._computed_before(connection, new)
+        source, same = None, {"hash": new.spec_hash, "owner": new.owner}
+        if not new.fresh:
+            source = connection.execute(attempts.COMPUTED_BEFORE, same).scalar_one_or_none()
         if source is None:
             if waiting_limit is not None:
                 require_share(connection, new.owner, waiting_limit)
@@ -384,11 +386,6 @@ class JobRepository:
                 f"job {known.id}: use a new key for a new request"
             )
         return known
-
-    @staticmethod
-    def _computed_before(connection: Connection, new: NewJob) -> str | None:
-        known = {"hash": new.spec_hash, "owner": new.owner}
-        return connection.execute(attempts.COMPUTED_BEFORE, known).scalar_one_or_none()
 
     def _insert(self, connection: Connection, new: NewJob, source: str | None) -> JobRow:
         """Insert a job; its row is what was written, not read again."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import datetime
 
 from sqlalchemy import ColumnElement, Connection, Text, and_, cast, delete, func, join, or_, select, update
@@ -40,13 +40,7 @@ class Pruned:
     links: int = 0
 
     def __add__(self, other: Pruned) -> Pruned:
-        return Pruned(
-            jobs=self.jobs + other.jobs,
-            sweeps=self.sweeps + other.sweeps,
-            uploads=self.uploads + other.uploads,
-            projects=self.projects + other.projects,
-            links=self.links + other.links,
-        )
+        return Pruned(**{name: count + getattr(other, name) for name, count in asdict(self).items()})
 
 
 class RetentionRepository:

@@ -18,7 +18,6 @@ from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response
 
 from service.auth.callers import KEYLESS, LINK_READERS, Caller, Scope
 from service.db.models import JobState
-from service.db.repositories import JobRow
 from service.db.repositories.run_repository import RunRow
 from service.errors import ConflictError, NotFoundError
 from service.http.dependencies import (
@@ -262,7 +261,9 @@ async def report(
     suffix = next(name for name, kind in FORMS.items() if kind == wanted)
     seconds = _patience(prefer, service.settings.max_wait_seconds)
     begun = time.monotonic()
-    if seconds is not None and not await wait_for_end(context, job_id, seconds, _has_ended):
+    if seconds is not None and not await wait_for_end(
+        context, job_id, seconds, lambda row: row.state.finished
+    ):
         return _not_yet(context, job_id, "computing")
     designed = await service.lanes.reads.run(owner, _designed, context, job_id)
     key = digest([*designed, suffix])
@@ -285,10 +286,6 @@ def _patience(prefer: str | None, longest: float) -> float | None:
     said = prefer or ""
     seconds = preferred_wait({"prefer": said}, longest)
     return 0.0 if seconds is None and "respond-async" in said.lower() else seconds
-
-
-def _has_ended(row: JobRow) -> bool:
-    return row.state.finished
 
 
 def _not_yet(context: Context, job_id: str, status: Literal["computing", "making"]) -> Response:

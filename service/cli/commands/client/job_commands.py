@@ -142,10 +142,7 @@ _INPUT_FAILURES = ("scene", "setting")
 def watch(client: Client, job: options.Job, as_json: options.Json = False) -> None:
     """Follow a job until it has ended."""
     ended = _follow(client, job)
-    if as_json:
-        print_json(ended.model_dump(mode="json"))
-    else:
-        say(f"{ended.id}  {ended.kind}  {ended.status.value}")
+    tell(ended, f"{ended.id}  {ended.kind}  {ended.status.value}", as_json=as_json)
     _end(ended)
 
 
@@ -204,19 +201,12 @@ def hand_in(client: Client, body: Mapping[str, Any], *, wait: bool, as_json: boo
     """Submit a job; print its id, or wait for its end and print what came out, with the id below."""
     job = client.submit(uploaded(client, body))
     if not wait:
-        _announce(job, as_json=as_json)
+        tell(job, job.id, as_json=as_json)
         return
     ended = _follow(client, job.id)
     answer = client.results(job.id)
     _show(ended, answer, as_json=as_json)
     _end(ended)
-
-
-def _announce(job: JobAnswer, *, as_json: bool) -> None:
-    if as_json:
-        print_json(job.model_dump(mode="json"))
-    else:
-        say(job.id)
 
 
 def _follow(client: Client, job: str) -> JobAnswer:
