@@ -71,7 +71,7 @@ class EmbeddedService:
 
     def job(self, job_id: str) -> JobAnswer:
         """How a job is (NotFoundError if there is none)."""
-        return JobAnswer.of(self._service.job(job_id), self._service.queue.live_progress(job_id))
+        return JobAnswer.of(self._service.job(job_id), self._service.queue.live(job_id))
 
     def wait(
         self, job_id: str, on_progress: OnProgress | None = None, timeout: float | None = None

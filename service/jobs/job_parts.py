@@ -26,10 +26,8 @@ class JobPart:
 
     Attributes
     ----------
-    spec : dict
-        JSON; with the spec of the job, all that is needed to compute it.
-    weight : float
-        Its share of the work, relative to the other parts.
+    spec : JSON; with the spec of the job, all that is needed to compute it.
+    weight : its share of the work, relative to the other parts.
     """
 
     spec: dict[str, Any]
@@ -42,14 +40,10 @@ class PartOutput:
 
     Attributes
     ----------
-    result : dict
-        JSON with finite numbers; what may be NaN is an array.
-    arrays : mapping
-        Arrays by name, as they are stored.
-    points : int
-        What it adds to the points of the job's progress.
-    final : bool
-        The result of the job needs this part alone: the others are left out.
+    result : JSON with finite numbers; what may be NaN is an array.
+    arrays : arrays by name, as they are stored.
+    points : what it adds to the points of the job's progress.
+    final : the result of the job needs this part alone: the others are left out.
     """
 
     result: dict[str, Any]
@@ -81,13 +75,10 @@ class Division:
 
     Attributes
     ----------
-    split : callable
-        From spec to parts; the same ones for the same spec. A part is known by its place in them.
-    run_part : callable
-        From spec, the spec of a part, progress (share and points of the part) and should_stop to output.
-        Raises PartStoppedError when it was told to stop, SolverError for what is wrong for good.
-    join : callable
-        From spec and the outputs by their place, all of them or a final one alone, to the job's output.
+    split : from spec to parts; the same ones for the same spec. A part is known by its place in them.
+    run_part : from spec, the spec of a part, progress (share and points of the part) and should_stop to
+        output. Raises PartStoppedError when it was told to stop, SolverError for what is wrong for good.
+    join : from spec and the outputs by their place, all of them or a final one alone, to the job's output.
     """
 
     split: Split
@@ -163,12 +154,9 @@ class Account:
 
     Parameters
     ----------
-    parts : sequence of Part
-        All of them.
-    outputs : mapping
-        Of those that are known already.
-    progress : callable
-        Told of the job's share and points.
+    parts : all of them.
+    outputs : of those that are known already.
+    progress : told of the job's share and points.
     """
 
     def __init__(

@@ -101,18 +101,12 @@ class KindView:
 
     Attributes
     ----------
-    result : str
-        What a job computes, for the documentation; Markdown.
-    sweeps : str
-        Which sweeps it stores; empty for none.
-    keys : str
-        In place of the list of its keys, where they are described elsewhere.
-    flags : mapping
-        Options of ``stickslip submit KIND`` that are not called as the key: key to ``--option``.
-    tell : callable or None
-        What is printed of a result; its numbers and words, by their keys, if left out.
-    draw : callable or None
-        The picture of a result, NothingToDrawError if it has none; the stored sweep with the peak of the
+    result : what a job computes, for the documentation; Markdown.
+    sweeps : which sweeps it stores; empty for none.
+    keys : in place of the list of its keys, where they are described elsewhere.
+    flags : options of ``stickslip submit KIND`` that are not called as the key: key to ``--option``.
+    tell : what is printed of a result; its numbers and words, by their keys, if left out.
+    draw : the picture of a result, NothingToDrawError if it has none; the stored sweep with the peak of the
         result if left out.
     """
 
@@ -224,10 +218,8 @@ class Resolved:
 
     Attributes
     ----------
-    spec : dict
-        JSON; equal specs of one kind give equal results.
-    scene_name, scene_hash : str or None
-        Of the scene as computed, for lists and filters.
+    spec : JSON; equal specs of one kind give equal results.
+    scene_name, scene_hash : of the scene as computed, for lists and filters.
     """
 
     spec: dict[str, Any]
@@ -250,28 +242,19 @@ class JobKind:
 
     Attributes
     ----------
-    name : str
-        As in ``"kind": …`` of a request: small letters, digits and hyphens, at most 32.
-    summary : str
-        One line for people.
-    request : type of JobRequest
-        Validates what was asked; its docstring and the `examples` of its schema are those of the API.
-    resolve : callable
-        From request to spec; raises InvalidRequestError for what does not fit or is too large. What comes by
-        HTTP is resolved in a process with limits (`service.jobs.answering`), to which the service sends the
-        scenes and uploads that are asked for.
-    run : callable
-        From spec to output; raises SolverError for what is wrong for good. Runs in a worker.
-    parts : Parts or None
-        How the work is divided, if it can be; `run` is then ``parts.run``, which computes them one after the
-        other.
-    run_on : callable or None
-        `run` with a fourth argument, `service.jobs.checkpoints.Checkpoints`: keeps what it has, and goes on
-        from what an earlier attempt kept. Divided kinds need none: their parts are kept.
-    result : type of BaseModel, function or None
-        The schema of the result, or what makes it when it is asked for; None for any JSON object.
-    view : KindView
-        What people see of it.
+    name : as in ``"kind": …`` of a request: small letters, digits and hyphens, at most 32.
+    summary : one line for people.
+    request : validates what was asked; its docstring and the `examples` of its schema are those of the API.
+    resolve : from request to spec; raises InvalidRequestError for what does not fit or is too large. What
+        comes by HTTP is resolved in a process with limits (`service.jobs.answering`), to which the service
+        sends the scenes and uploads that are asked for.
+    run : from spec to output; raises SolverError for what is wrong for good. Runs in a worker.
+    parts : how the work is divided, if it can be; `run` is then ``parts.run``, which computes them one after
+        the other.
+    run_on : `run` with a fourth argument, `service.jobs.checkpoints.Checkpoints`: keeps what it has, and goes
+        on from what an earlier attempt kept. Divided kinds need none: their parts are kept.
+    result : the schema of the result, or what makes it when it is asked for; None for any JSON object.
+    view : what people see of it.
 
     Raises
     ------
@@ -316,10 +299,8 @@ class Registry:
 
     Parameters
     ----------
-    kinds : iterable of JobKind
-        The kinds.
-    warm_up : callable
-        Loads and compiles what the kinds need; sent to workers by name, as their `run` is.
+    kinds : the kinds.
+    warm_up : loads and compiles what the kinds need; sent to workers by name, as their `run` is.
     """
 
     def __init__(self, kinds: Iterable[JobKind], warm_up: WarmUp = no_warm_up) -> None:

@@ -28,11 +28,12 @@ OnProgress = Callable[[float, int], None]
 ShouldStop = Callable[[], bool]
 
 
-class AttemptProgress(NamedTuple):
-    """How far an attempt is: share of its path, points computed, the best design so far."""
+class Report(NamedTuple):
+    """How far an attempt is: share of the path, points computed, what is new of its branch, best design."""
 
     fraction: float
     points: int
+    found: tuple[Point, ...] = ()
     best: Best | None = None
 
 

@@ -19,7 +19,7 @@ from dataclasses import replace
 from datetime import datetime, timedelta
 
 from service.db.repositories import Attempt, JobRepository
-from service.jobs.outputs import AttemptProgress, Best, FailureKind, JobFailure, JobOutput, Point, ResultPiece
+from service.jobs.outputs import FailureKind, JobFailure, JobOutput, Report, ResultPiece
 from service.queue.meters import Meters
 from service.queue.running import Live, Running, StopReason, Waiters
 from service.settings import logs, traces
@@ -119,14 +119,8 @@ class JobQueue:
         if entry is not None:
             self._ask_to_stop(entry, StopReason.CANCEL)
 
-    def live_progress(self, job_id: str) -> AttemptProgress | None:
-        """What a job that runs here has told, newer than its row."""
-        with self._lock:
-            entry = self._running.get(job_id)
-        return None if entry is None else AttemptProgress(entry.fraction, entry.points, entry.best)
-
     def live(self, job_id: str) -> Live | None:
-        """How far a job is that runs here."""
+        """How far a job is that runs here, newer than its row."""
         with self._lock:
             entry = self._running.get(job_id)
         if entry is None:
@@ -145,12 +139,17 @@ class JobQueue:
         """Whether the queue takes jobs."""
         return self._thread.is_alive() and not self._stopping
 
-    def progress(self, attempt: Attempt, fraction: float, points: int) -> None:
+    def reported(self, attempt: Attempt, report: Report) -> None:
         """From the executor: remember and pass on how far an attempt got; write it now and then."""
         entry = self._entry(attempt)
-        if entry is None or self._stopping:
+        if entry is None:
             return
-        entry.fraction, entry.points = fraction, points
+        entry.found.extend(report.found[: _MOST_POINTS - len(entry.found)])
+        if report.best is not None:
+            entry.best, entry.unwritten = report.best, True
+        if self._stopping:
+            return
+        entry.fraction, entry.points = fraction, points = report[:2]
         now = time.monotonic()
         pause = max(_WRITE_SECONDS, len(self._running) / _WRITES_A_SECOND)
         if now - entry.written < min(pause, self._settings.lease_seconds / 3.0):
@@ -167,18 +166,6 @@ class JobQueue:
             self._waiters.progress(attempt.job_id, fraction, points)
         else:
             self._ask_to_stop(entry, StopReason.LEASE)
-
-    def found(self, attempt: Attempt, points: Sequence[Point]) -> None:
-        """From the executor: keep the points of a branch for those who follow it."""
-        entry = self._entry(attempt)
-        if entry is not None:
-            entry.found.extend(points[: _MOST_POINTS - len(entry.found)])
-
-    def best(self, attempt: Attempt, found: Best) -> None:
-        """From the executor: keep the best design so far; it is written with the next progress."""
-        entry = self._entry(attempt)
-        if entry is not None:
-            entry.best, entry.unwritten = found, True
 
     def kept(self, attempt: Attempt, pieces: Sequence[ResultPiece], *, anew: bool) -> None:
         """From the executor: store pieces for a later attempt, also while the service stops."""

@@ -16,7 +16,6 @@ from service.db import pagination
 from service.db.models import JobState, StoredScene
 from service.db.pagination import Position
 from service.db.repositories import JobRow, ResultRepository
-from service.jobs.outputs import AttemptProgress
 from service.jobs.stored_figures import DESIGN, SWEEP, DesignRecord, Quantity, StoredRecord, SweepRecord
 from service.settings.settings import Settings
 from solver.contacts.laws.law_registry import DEFAULT, laws
@@ -24,6 +23,7 @@ from solver.scene.json_schema import scene_schema
 
 if TYPE_CHECKING:
     from service.queue.core import Results, WholeDesign
+    from service.queue.running import Live
 
 
 BEST = (
@@ -81,9 +81,9 @@ class JobAnswer(AnswerModel):
     links: dict[str, str]
 
     @classmethod
-    def of(cls, row: JobRow, live: AttemptProgress | None = None, **more: Any) -> Self:
+    def of(cls, row: JobRow, live: Live | None = None, **more: Any) -> Self:
         """The answer for a row, with progress that is newer than the row if there is any, and with `more`."""
-        progress, points, best = live or (row.progress, row.points, row.best)
+        progress, best = (row.progress, row.best) if live is None else (live.fraction, live.best)
         source = row.result_of or row.id
         links = {
             "self": f"/v1/jobs/{row.id}",
@@ -94,7 +94,7 @@ class JobAnswer(AnswerModel):
         if row.kind == "design":
             links["design"] = f"/v1/designs/{source}"
         return cls._from(
-            row, status=row.state, progress=progress, points=points, scene=row.scene_name,
+            row, status=row.state, progress=progress, points=(live or row).points, scene=row.scene_name,
             best=None if best is None else dict(best), links=links | more.pop("links", {}), **more,
         )  # fmt: skip
 

@@ -11,7 +11,7 @@ from pydantic import AfterValidator, AwareDatetime, BaseModel, Field
 from service.db.models import JobState, Project, Share
 from service.db.repositories.run_repository import RunFilter, RunRow
 from service.jobs.kind_registry import LONGEST_TAG, MOST_TAGS, Notes, ProjectName, RunName, Tags
-from service.jobs.outputs import AttemptProgress
+from service.queue.running import Live
 from service.schemas.answers import AnswerModel, AskedModel, Cursor, JobAnswer, Limit, ListQuery, Page, Peak
 
 _REVISION = "Counts the changes; the `ETag`, for `If-Match` of a change."
@@ -38,7 +38,7 @@ class RunAnswer(JobAnswer):
     deleted: datetime | None = Field(description=_DELETED)
 
     @classmethod
-    def of_run(cls, row: RunRow, live: AttemptProgress | None = None) -> Self:
+    def of_run(cls, row: RunRow, live: Live | None = None) -> Self:
         """The answer for a row, with progress that is newer than the row if there is any."""
         job, about = f"/v1/jobs/{row.job.id}", f"/v1/runs/{row.job.id}"
         said = {name: getattr(row, name) for name in ("sweeps", "revision", "changed", "deleted")}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, Protocol
 
 from service.db.repositories import Attempt
-from service.jobs.outputs import Best, JobFailure, JobOutput, Point, ResultPiece
+from service.jobs.outputs import JobFailure, JobOutput, Report, ResultPiece
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,14 +43,8 @@ Outcome = Finished | Failed | Stopped | Lost
 class Sink(Protocol):
     """What the queue wants to hear; called from the executor's threads."""
 
-    def progress(self, attempt: Attempt, fraction: float, points: int) -> None:
-        """The attempt got this far: fraction 0..1 of its path, points computed."""
-
-    def found(self, attempt: Attempt, points: Sequence[Point]) -> None:
-        """The next points of the attempt's branch; said before the progress that counts them."""
-
-    def best(self, attempt: Attempt, found: Best) -> None:
-        """The attempt's best design so far; said before the progress that goes with it."""
+    def reported(self, attempt: Attempt, report: Report) -> None:
+        """The attempt got this far."""
 
     def kept(self, attempt: Attempt, pieces: Sequence[ResultPiece], *, anew: bool) -> None:
         """The attempt keeps pieces of its work for a later one; `anew` if they replace all before them."""
@@ -68,7 +62,7 @@ class Unwatched:
     def _nobody(self, *_: object, **__: object) -> None:
         """Nobody watches."""
 
-    progress = found = best = kept = _nobody
+    reported = kept = _nobody
 
 
 class Executor(Protocol):

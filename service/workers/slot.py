@@ -433,11 +433,7 @@ class Slot(threading.Thread):
         elif isinstance(about, KeptPieces):
             self._executor.sink.kept(current.work, about.pieces, anew=about.anew)
         else:
-            if about.found:
-                self._executor.sink.found(current.work, about.found)
-            if about.best is not None:
-                self._executor.sink.best(current.work, about.best)
-            self._executor.sink.progress(current.work, about.fraction, about.points)
+            self._executor.sink.reported(current.work, about)
 
     def _conclude(self, child: Child, token: int, done: Done | ErrandDone) -> None:
         """An attempt or a batch ended: go on with the next one, then say what became of it."""

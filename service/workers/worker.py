@@ -27,7 +27,7 @@ from service.errors import UnknownKindError
 from service.jobs import strict_json
 from service.jobs.checkpoints import Checkpoints, KeptPieces
 from service.jobs.kind_registry import RunOn, WarmUp
-from service.jobs.outputs import Best, FailureKind, JobFailure, JobOutput, Pace, Point, ResultPiece
+from service.jobs.outputs import Best, FailureKind, JobFailure, JobOutput, Pace, Point, Report, ResultPiece
 from service.jobs.stored_figures import alone, figures
 from service.settings import logs, traces
 from service.workers.process_limits import ProcessLimits
@@ -100,16 +100,6 @@ class Recall:
 @dataclass(frozen=True, slots=True)
 class WorkerReady:
     """From a worker: everything is loaded."""
-
-
-@dataclass(frozen=True, slots=True)
-class Report:
-    """From a worker: how far it got, with what was found since the last report."""
-
-    fraction: float
-    points: int
-    found: tuple[Point, ...] = ()
-    best: Best | None = None
 
 
 @dataclass(frozen=True, slots=True)

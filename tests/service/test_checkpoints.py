@@ -124,8 +124,8 @@ def test_a_killed_child_is_followed_by_one_that_goes_on(make_settings: MakeSetti
 
 def watch(service: Service, job: str, seen: list[float], done: threading.Event) -> None:
     while not done.wait(0.01):
-        live = service.queue.live_progress(job)
-        seen.append(service.job(job).progress if live is None else live[0])
+        live = service.queue.live(job)
+        seen.append(service.job(job).progress if live is None else live.fraction)
 
 
 @pytest.mark.long

@@ -16,7 +16,7 @@ from service_helpers import PATIENCE, pids, until
 
 from service.db.clock import utc_now
 from service.db.repositories import Attempt
-from service.jobs.outputs import Point, ResultPiece
+from service.jobs.outputs import Report, ResultPiece
 from service.settings.settings import load_settings
 from service.workers import processes
 from service.workers.executor import Finished, Lost, Outcome, Stopped
@@ -31,13 +31,7 @@ class Heard:
         self.ends: list[tuple[str, Outcome]] = []
         self.lock = threading.Lock()
 
-    def progress(self, attempt: Attempt, fraction: float, points: int) -> None:
-        """Nothing is kept."""
-
-    def found(self, attempt: Attempt, points: Sequence[Point]) -> None:
-        """Nothing is kept."""
-
-    def best(self, attempt: Attempt, found: object) -> None:
+    def reported(self, attempt: Attempt, report: Report) -> None:
         """Nothing is kept."""
 
     def kept(self, attempt: Attempt, pieces: Sequence[ResultPiece], *, anew: bool) -> None:

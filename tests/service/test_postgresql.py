@@ -229,7 +229,7 @@ def test_two_services_in_one_process_share_the_jobs(url: str) -> None:
         assert [(row.state, row.attempt) for row in done] == [(JobState.SUCCESSFUL, 1)] * 6
         long = one.submit({"kind": "iteration", "seconds": 600.0})[0].id
         until(lambda: one.job(long).state is JobState.RUNNING)
-        away = next(service for service in services if service.queue.live_progress(long) is None)
+        away = next(service for service in services if service.queue.live(long) is None)
         away.dismiss(long)
         assert away.wait(long, PATIENCE).state is JobState.DISMISSED, "wherever it runs"
 
@@ -348,7 +348,7 @@ def test_services_tell_each_other_without_polling(url: str, monkeypatch: pytest.
         bodies = [{"kind": "iteration", "seconds": seconds, "seed": 1} for seconds in (599.0, 600.0)]
         long = [one.submit(body)[0].id for body in bodies]
         until(lambda: all(service.queue.status().busy for service in services))
-        away = next(job for job in long if one.queue.live_progress(job) is None)
+        away = next(job for job in long if one.queue.live(job) is None)
         one.dismiss(away)
         assert one.wait(away, 30.0).state is JobState.DISMISSED
         here = next(job for job in long if job != away)

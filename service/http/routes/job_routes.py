@@ -211,4 +211,4 @@ def _job_or_result(service: Service, headers: Mapping[str, str], row: JobRow) ->
 
 
 def _answer(service: Service, row: JobRow) -> JobAnswer:
-    return JobAnswer.of(row, None if row.state.finished else service.queue.live_progress(row.id))
+    return JobAnswer.of(row, None if row.state.finished else service.queue.live(row.id))

@@ -146,7 +146,7 @@ def _under_way(service: Service, asked: set[str | None]) -> set[str]:
 def _events(service: Service, ids: set[str], heard: set[str | None]) -> list[tuple[RunAnswer, bytes]]:
     owners = None if None in heard else [one for one in heard if one is not None]
     rows = service.runs.several(sorted(ids), owners) if ids else []
-    runs = [RunAnswer.of_run(row, service.queue.live_progress(row.id)) for row in rows]
+    runs = [RunAnswer.of_run(row, service.queue.live(row.id)) for row in rows]
     return [(run, format_sse_event(event=_RUN, data_str=run.model_dump_json(by_alias=True))) for run in runs]
 
 

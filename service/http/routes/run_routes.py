@@ -172,7 +172,7 @@ def list_runs(context: InContext, query: Annotated[RunQuery, Query()]) -> Respon
     rows, following = newest(
         query, context.service.settings, partial(context.service.runs.page, query.to_filter(context.sees))
     )
-    items = [RunAnswer.of_run(row, context.service.queue.live_progress(row.id)) for row in rows]
+    items = [RunAnswer.of_run(row, context.service.queue.live(row.id)) for row in rows]
     return listing(context, RunPage(items=items, next=following))
 
 
@@ -213,7 +213,7 @@ def restore_run(job_id: str, context: InContext) -> Response:
 
 
 def _answer(context: Context, row: RunRow) -> Response:
-    live = None if row.job.state.finished else context.service.queue.live_progress(row.id)
+    live = None if row.job.state.finished else context.service.queue.live(row.id)
     return revised(RunAnswer.of_run(row, live))
 
 

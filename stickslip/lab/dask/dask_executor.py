@@ -24,7 +24,7 @@ from distributed import Future, KilledWorker, Security
 from service.db.repositories import Attempt
 from service.errors import UnknownKindError
 from service.jobs.checkpoints import KeptPieces
-from service.jobs.outputs import Pace
+from service.jobs.outputs import Pace, Report
 from service.jobs.kind_registry import Registry
 from service.settings.settings import Settings
 from service.workers.executor import ExecutorStatus, Failed, Finished, Lost, Outcome, Sink, Stopped
@@ -352,11 +352,8 @@ class DaskExecutor:
             flight.begun, flight.worker = note["begun"], str(note["worker"])
             flight.threads = int(note["threads"])
         elif "share" in note:
-            if found:
-                self._sink.found(flight.work.attempt, found)
-            if "best" in note:
-                self._sink.best(flight.work.attempt, note["best"])
-            self._sink.progress(flight.work.attempt, float(note["share"]), int(note["points"]))
+            report = Report(float(note["share"]), int(note["points"]), tuple(found), note.get("best"))
+            self._sink.reported(flight.work.attempt, report)
 
     def _begun_again(self, flight: Flight) -> None:
         """Its worker died, and the scheduler gave the order to another one by itself."""

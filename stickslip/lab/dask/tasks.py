@@ -22,14 +22,13 @@ from distributed import Client, Future, Status, Worker, get_client, get_worker, 
 
 from service.errors import ConfigurationError
 from service.jobs.checkpoints import Checkpoints, KeptPieces
-from service.jobs.outputs import JobFailure, JobOutput, Pace, ResultPiece
+from service.jobs.outputs import JobFailure, JobOutput, Pace, Report, ResultPiece
 from service.jobs.kind_registry import RunOn, WarmUp
 from service.settings import traces
 from service.workers.process_limits import ProcessLimits
 from service.workers.spreading import BatchAnswer, Spreading, helped
 from service.workers.worker import (
     THREAD_LIMITS,
-    Report,
     Throttle,
     checked,
     failure_of,
