@@ -209,33 +209,24 @@ _ERRORS: dict[str, tuple[type[errors.ServiceError], str, list[dict[str, str]]]] 
 _BODY = ("MalformedBody", "BodyTooSlow", "BodyTooLarge", "UnsupportedMedia", "InvalidRequest")
 _KEYED = ("Unauthorized", "Forbidden", "TooManyRequests")
 _LIST = ("NotAcceptable", "InvalidQuery")
+_COMPUTED = ("jobs", "designs", "plan", "scenes/read", "scenes/text", "scenes/edit")
+_LISTS = ("jobs", "designs", "sweeps", "results", "uploads", "projects", "runs")
 _OF: dict[tuple[str, str], tuple[str, ...]] = {
-    ("post", "/v1/jobs"): (*_BODY, "QueueFull"),
-    ("post", "/v1/designs"): (*_BODY, "QueueFull"),
+    **{("post", f"/v1/{name}"): (*_BODY, "QueueFull") for name in _COMPUTED},
+    **{("get", f"/v1/{name}"): _LIST for name in _LISTS},
     ("post", "/v1/scenes"): (*_BODY, "Conflict", "QueueFull"),
     ("get", "/v1/scenes"): ("InvalidQuery",),
-    ("post", "/v1/plan"): (*_BODY, "QueueFull"),
     ("post", "/v1/previews"): (*_BODY, "Overtaken", "Preview", "QueueFull"),
-    ("post", "/v1/scenes/read"): (*_BODY, "QueueFull"),
-    ("post", "/v1/scenes/text"): (*_BODY, "QueueFull"),
-    ("post", "/v1/scenes/edit"): (*_BODY, "QueueFull"),
     ("post", "/v1/templates"): _BODY,
     ("post", "/v1/uploads"): (
         "BodyTooSlow", "BodyTooLarge", "UnsupportedMedia", "UnreadableUpload", "QueueFull",
     ),
-    ("get", "/v1/jobs"): _LIST,
-    ("get", "/v1/designs"): _LIST,
-    ("get", "/v1/sweeps"): _LIST,
-    ("get", "/v1/results"): _LIST,
-    ("get", "/v1/uploads"): _LIST,
     ("get", "/v1/sweeps/{sweep_id}"): ("NotAcceptable", "InvalidQuery"),
     ("delete", "/v1/jobs/{job_id}"): ("Conflict",),
     ("get", "/v1/jobs/{job_id}/results"): ("Conflict", "JobFailed"),
-    ("get", "/v1/projects"): _LIST,
     ("post", "/v1/projects"): (*_BODY, "StorageFull"),
     ("patch", "/v1/projects/{project_id}"): (*_BODY, "Conflict", "ChangedMeanwhile"),
     ("post", "/v1/projects/{project_id}/restore"): ("Conflict",),
-    ("get", "/v1/runs"): _LIST,
     ("get", "/v1/runs/compare"): ("NotFound", "InvalidQuery"),
     ("patch", "/v1/runs/{job_id}"): (*_BODY, "Conflict", "ChangedMeanwhile"),
     ("delete", "/v1/runs/{job_id}"): ("Conflict",),

@@ -121,10 +121,10 @@ def _read(asked: ImportOptions) -> _Read:
     positions, turn = None if given is None else given.deck, None if of is None else (of.sectors, of.axis)
     faces = Patches(asked.patches, positions, found.units, turn, asked.tolerance)
     table = dof_table(asked.dofs, found, given, patches=bool(asked.patches))
-    made = faces.made(given, table)
+    dofs, tables = faces.made(given, table)
     return _Read(
-        found=found, given=given, deck=deck, of=of, table=table | made.dofs,
-        parts=made.tables | {"contacts": contact_tables(asked.contacts)},
+        found=found, given=given, deck=deck, of=of, table=table | dofs,
+        parts=tables | {"contacts": contact_tables(asked.contacts)},
     )  # fmt: skip
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from service.cli.importing.import_files import split
 from service.errors import InputError
@@ -19,14 +18,6 @@ _Touched = tuple[int, Mapping[int, float], Any, Any]
 """A node, what it touches with weights, its place and its area."""
 _NEXT = "@next"
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PatchTables:
-    """What patches add to a scene."""
-
-    dofs: Annotated[dict[str, int | str], "DOFs of their nodes that had no name, each with its label."]
-    tables: Annotated[dict[str, list[dict[str, Any]]], "The tables [[nodes]] and [[dampers]]."]
 
 
 class Patches:
@@ -164,8 +155,10 @@ class Patches:
             )
         return [value / size for value in vector]
 
-    def made(self, given: MatrixSet | None, known: Mapping[str, int | str]) -> PatchTables:
-        """What the patches add to a scene.
+    def made(
+        self, given: MatrixSet | None, known: Mapping[str, int | str]
+    ) -> tuple[dict[str, int | str], dict[str, list[dict[str, Any]]]]:
+        """What the patches add to a scene: DOFs of their nodes that had no name, each with its label; tables.
 
         Parameters
         ----------
@@ -193,4 +186,4 @@ class Patches:
             dofs |= {dof: labels[axis] for axis, dof in own.items() if dof not in known}
             at = [value * self._metres for value in self._nodes[node]]
             nodes.append({"name": f"n{node}", "at": at, "dofs": own})
-        return PatchTables(dofs=dofs, tables={"nodes": nodes, "dampers": self._dampers})
+        return dofs, {"nodes": nodes, "dampers": self._dampers}

@@ -40,7 +40,6 @@ from service.schemas.result_queries import (
 
 sweeps = APIRouter(prefix="/v1/sweeps", tags=["sweeps"])
 
-_PICTURE_TYPES = {"svg": "image/svg+xml", "png": "image/png"}
 SWEEP_FORMS: dict[int | str, dict[str, Any]] = {
     200: media({form: TEXT if form.startswith("text/") else BINARY for form in SWEEP_MEDIA if form != JSON}),
     **UNCHANGED,
@@ -84,32 +83,24 @@ def sweep_answer(sweep: SweepRecord, form: str | None, context: Context) -> Resp
     return tagged(request, sweep_body(sweep, kind, service.stored, scene), kind, headers)
 
 
-@sweeps.get(
-    "/{sweep_id}/plot.svg",
-    response_class=Response,
-    responses={200: media({"image/svg+xml": TEXT}), **UNCHANGED},
-)
-@drawing
-def plot_svg(sweep_id: str, context: InContext) -> Response:
-    """The curve of a stored sweep, its peak marked, its band shaded."""
-    return _picture(context.service.sweep(sweep_id, context.caller), "svg", context)
+def _draw_as(suffix: str, form: str, schema: dict[str, Any]) -> None:
+    """Add the route of pictures in a form."""
+
+    def plot(sweep_id: str, context: InContext) -> Response:
+        """The curve of a stored sweep, its peak marked, its band shaded."""
+        sweep = context.service.sweep(sweep_id, context.caller)
+        scene = context.service.jobs.spec(sweep.job_id).get("scene")
+        picture = sweep_picture(sweep, suffix, context.service.stored, scene)
+        return tagged(context.request, picture, form)
+
+    sweeps.add_api_route(
+        f"/{{sweep_id}}/plot.{suffix}", drawing(plot), name=f"plot_{suffix}", response_class=Response,
+        responses={200: media({form: schema}), **UNCHANGED},
+    )  # fmt: skip
 
 
-@sweeps.get(
-    "/{sweep_id}/plot.png",
-    response_class=Response,
-    responses={200: media({"image/png": BINARY}), **UNCHANGED},
-)
-@drawing
-def plot_png(sweep_id: str, context: InContext) -> Response:
-    """The curve of a stored sweep, its peak marked, its band shaded."""
-    return _picture(context.service.sweep(sweep_id, context.caller), "png", context)
-
-
-def _picture(sweep: SweepRecord, suffix: str, context: Context) -> Response:
-    scene = context.service.jobs.spec(sweep.job_id).get("scene")
-    picture = sweep_picture(sweep, suffix, context.service.stored, scene)
-    return tagged(context.request, picture, _PICTURE_TYPES[suffix])
+_draw_as("svg", "image/svg+xml", TEXT)
+_draw_as("png", "image/png", BINARY)
 
 
 designs = APIRouter(prefix="/v1/designs", tags=["designs"])
