@@ -4,8 +4,8 @@ from stickslip.lab.proofs.certificate import (
     CertificateStatus as CertificateStatus,
     certify as certify,
 )
-from .contacts.laws.history.definition import LawParameter as LawParameter
-from .contacts.laws.history.register import register_law as register_law
+from .contacts.laws.history.function_law import LawParameter as LawParameter
+from .contacts.laws.history.function_law import register_law as register_law
 from .contacts.pieces.line import Shares as Shares
 from .continuation.branch import AnyBranch as AnyBranch, Branch as Branch, BranchStatus as BranchStatus
 from .continuation.extrema.error_estimate import (

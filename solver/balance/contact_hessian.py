@@ -17,7 +17,7 @@ from solver.contacts.kernels.laws import law_force, law_second, second_number
 from solver.contacts.kernels.stick_slip_events import FAILED, new_segments
 from solver.contacts.kernels.system import System
 from solver.contacts.laws.contact_law import without_second
-from solver.contacts.load_derivatives import contradicting
+from solver.contacts.laws.load_harmonics import contradicting
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Integer, Real, coefficient_count
 from solver.scene.scene import Scene

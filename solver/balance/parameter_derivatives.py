@@ -13,8 +13,7 @@ from solver.balance.kernels.residual import contact_values
 from solver.balance.parameter import Kind, Parameter, resolve
 from solver.contacts.kernels.laws import law_force
 from solver.contacts.kernels.system import MODES, Evaluation
-from solver.contacts.laws.load_harmonics import is_of_variation
-from solver.contacts.load_derivatives import load_slopes
+from solver.contacts.laws.load_harmonics import is_of_variation, load_slopes
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import structure_derivative
@@ -73,7 +72,7 @@ def contact_slopes(balance: Balance, parameters: Sequence[Parameter]) -> tuple[R
     Returns
     -------
     (n_paths, n_contacts, ·) of the rows of the contact table, and (n_paths, n_contacts, 1 + 2 K) of the
-    coefficients of the loads, see `solver.contacts.load_derivatives`.
+    coefficients of the loads, see `solver.contacts.laws.load_harmonics`.
     """
     rows = balance.system.contacts
     slopes = np.zeros((len(parameters), *rows.shape))

@@ -21,7 +21,7 @@ import numpy as np
 
 from solver.balance.contact_hessian import ContactForces, second_forces
 from solver.balance.whole_motion import WholeMotion, times, times_transposed
-from solver.contacts.load_derivatives import second_loads
+from solver.contacts.laws.load_harmonics import second_loads
 from solver.jit.fourier import Complex, Integer, Real
 from solver.results.told import Piece
 

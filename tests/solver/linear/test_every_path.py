@@ -14,7 +14,7 @@ from scene_cases import bladed_disk, two_dof
 
 from solver.balance.balance import contact_rows
 from solver.balance.parameter import Kind, Parameter, resolve
-from solver.contacts.load_derivatives import load_slopes
+from solver.contacts.laws.load_harmonics import load_slopes
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.condensation import force_amplitudes, term_amplitudes
 from solver.scene.cyclic.annulus import annulus

@@ -11,8 +11,7 @@ from __future__ import annotations
 import math
 
 from solver.contacts.fields import Real
-from solver.contacts.laws.history.definition import HistoryLaw, LawParameter
-from solver.contacts.laws.history.register import law_class
+from solver.contacts.laws.history.function_law import HistoryLaw, LawParameter, law_class
 
 K, ALPHA, A, BETA, GAMMA, N = range(6)
 

@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from solver.contacts.fields import Real
-from solver.contacts.laws.history.definition import HistoryLaw, LawParameter
-from solver.contacts.laws.history.register import law_class
+from solver.contacts.laws.history.function_law import HistoryLaw, LawParameter, law_class
 
 MU, LOAD, V0 = range(3)
 

@@ -20,7 +20,7 @@ from solver.contacts.kernels import columns
 from solver.contacts.laws.contact_law import AnyContact, RateContact
 from solver.contacts.laws.contact_parts import Follows, LawQuantity, Row, Slider
 from solver.contacts.laws.friction import FrictionContact
-from solver.contacts.laws.history.definition import HistoryLaw, LawParameter
+from solver.contacts.laws.history.function_law import HistoryLaw, LawParameter
 from solver.errors import SettingError
 
 if TYPE_CHECKING:

@@ -9,8 +9,7 @@ Mech. 23 (1971) 517, whose simplest law without a yield surface is Dahl's with e
 from __future__ import annotations
 
 from solver.contacts.fields import Real
-from solver.contacts.laws.history.definition import Derivatives, HistoryLaw, LawParameter
-from solver.contacts.laws.history.register import law_class
+from solver.contacts.laws.history.function_law import Derivatives, HistoryLaw, LawParameter, law_class
 
 SIGMA, LIMIT, EXPONENT, K = range(4)
 

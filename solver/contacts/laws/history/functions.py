@@ -18,7 +18,7 @@ import numpy as np
 
 from solver.contacts.kernels.columns import MOST_OWN
 from solver.contacts.kernels.history.partials import BY_COMPLEX_STEP, BY_DIFFERENCES, BY_HAND
-from solver.contacts.laws.history.definition import Derivatives, HistoryLaw
+from solver.contacts.laws.history.function_law import Derivatives, HistoryLaw
 from solver.errors import SettingError
 from solver.jit.decorators import kept
 from solver.jit.kernel_contracts import of_numba

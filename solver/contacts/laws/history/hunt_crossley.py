@@ -12,9 +12,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from solver.contacts.fields import Real
-from solver.contacts.laws.history.contact import HistoryContact
-from solver.contacts.laws.history.definition import HistoryLaw, LawParameter
-from solver.contacts.laws.history.register import law_class
+from solver.contacts.laws.history.function_law import HistoryContact, HistoryLaw, LawParameter, law_class
 
 K, GAP, CHI = range(3)
 

@@ -21,9 +21,7 @@ import numpy as np
 
 from solver.contacts.fields import Real
 from solver.contacts.laws.contact_parts import Row
-from solver.contacts.laws.history.contact import HistoryContact
-from solver.contacts.laws.history.definition import HistoryLaw, LawParameter
-from solver.contacts.laws.history.register import law_class
+from solver.contacts.laws.history.function_law import HistoryContact, HistoryLaw, LawParameter, law_class
 
 LIMIT, K, CHI, BETA = range(4)
 SLIDERS, DECADES = 40, 3.0  # of the density; one more is the S of them
