@@ -47,14 +47,6 @@ class CriterionContext:
     values: Annotated[Mapping[str, object], "The criterion's keys that were given."]
 
 
-def _always_there(_scene: Scene) -> str:
-    return ""
-
-
-def _unscaled(_scene: Scene) -> float:
-    return 1.0
-
-
 def positive_limit(asked: CriterionContext) -> object:
     """Read the one key of a criterion as a number above 0.
 
@@ -112,10 +104,10 @@ class Criterion:
     endless: Annotated[str, "Why a value is inf, in words."] = ""
     scale: Annotated[
         Callable[[Scene], float], "What an excess over a limit of 0 is relative to, in a scene."
-    ] = _unscaled
+    ] = lambda _scene: 1.0
     lacking: Annotated[
         Callable[[Scene], str], "Why a scene has nothing of it to be minimised; empty if it has."
-    ] = _always_there
+    ] = lambda _scene: ""
     always: Annotated[bool, "Whether its rows are wanted if nobody asks: results show them."] = False
     each_blade: Annotated[bool, "Whether it is that of every blade of a mistuned disk."] = False
     limit_name: Annotated[str, "How results call its limit."] = ""

@@ -19,7 +19,6 @@ from optim.criteria.key import number_or_table
 
 if TYPE_CHECKING:
     from optim.problem.variables import Real
-    from solver.scene.scene import Scene
 
 
 _DAMPING = "min_damping"
@@ -103,10 +102,6 @@ def read_mode(asked: CriterionContext, key: str, number: str, *, needed: bool) -
     return limit, positive((key, "amplitude"), given["amplitude"]), mode
 
 
-def _ratio(_scene: Scene) -> float:
-    return 0.01
-
-
 DAMPING = Criterion(
     name="damping ratio",
     unit="1",
@@ -123,7 +118,7 @@ DAMPING = Criterion(
         ),
     ),
     read=partial(read_mode, key=_DAMPING, number="ratio", needed=True),
-    scale=_ratio,
+    scale=lambda _scene: 0.01,
 )  # fmt: skip
 
 

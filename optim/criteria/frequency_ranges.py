@@ -61,17 +61,14 @@ def _read_forbidden(asked: CriterionContext) -> _Over:
 
 
 def _ranges(name: str, ranges: object) -> Ranges:
-    from optim.problem.checks import DesignError, number_pair
+    from optim.problem.checks import DesignError, number_pair, range_above_zero
 
     if ranges is None:
         return ()
     if not isinstance(ranges, Sequence) or isinstance(ranges, str) or not ranges:
         raise DesignError(name, ranges, "must be a list of ranges, [[low, high], …]")
-    found = tuple(number_pair((name, i), pair) for i, pair in enumerate(ranges))
-    for i, (low, high) in enumerate(found):
-        if not 0.0 < low < high:
-            raise DesignError((name, i), [low, high], "must have 0 < low < high")
-    return found
+    pairs = [number_pair((name, i), pair) for i, pair in enumerate(ranges)]
+    return tuple(range_above_zero((name, i), list(pair)) for i, pair in enumerate(pairs))
 
 
 FORBIDDEN = Criterion(

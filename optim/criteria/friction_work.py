@@ -23,29 +23,16 @@ if TYPE_CHECKING:
 
 
 _WORK = "max_friction_work"
+Read = Mapping[str, tuple[float | None, float]]
+"""Contact to its bound, if it has one, and to the factor on the measure."""
 
 
-def _work_rows(judged: Judged) -> list[CriterionRow]:
-    """A row for every local maximum that competes, of every contact that is limited."""
-    from solver.response.worst_wear import Measure
+def _rows(judged: Judged, criterion: Criterion, measured: str) -> list[CriterionRow]:
+    """Return a row for every local maximum of a measure that competes, of every contact asked for."""
+    from solver.response.worst_wear import Measure, worst_slopes, worst_wear
 
-    bounds = judged.limit(FRICTION_WORK) or {}
-    each = {name: (bound, 1.0) for name, bound in bounds.items()}
-    return worst_rows(judged, FRICTION_WORK, Measure.FRICTION_WORK, each)
-
-
-def worst_rows(
-    judged: Judged, criterion: Criterion, measure: Measure,
-    each: Mapping[str, tuple[float | None, float]], weight: float | None = None,
-) -> list[CriterionRow]:  # fmt: skip
-    """Return a row for every local maximum of a measure of contacts that competes.
-
-    Parameters
-    ----------
-    each : contact to its bound and to the factor on the measure.
-    """
-    from solver.response.worst_wear import worst_slopes, worst_wear
-
+    measure, each = Measure[measured], judged.limit(criterion) or {}
+    weight = judged.weight(criterion) * judged.case.weight
     rows, sensitivity = [], judged.sensitivity
     if sensitivity is not None and not sensitivity.has_second:
         sensitivity = None
@@ -72,8 +59,8 @@ def _times(factor: float, sensitivity: Sensitivity, worst: WorstWear, contact: s
     return factor * worst_hessian(sensitivity.amplitudes, worst, contact, measure)
 
 
-def _read_work(asked: CriterionContext) -> Mapping[str, float]:
-    return by_contact(_WORK, asked.values[_WORK], asked.scene)
+def _read_work(asked: CriterionContext) -> Read:
+    return {name: (most, 1.0) for name, most in by_contact(_WORK, asked.values[_WORK], asked.scene).items()}
 
 
 def by_contact(key: str, limits: object, scene: Scene) -> Mapping[str, float]:
@@ -94,7 +81,7 @@ FRICTION_WORK = Criterion(
     name="friction work",
     unit="J",
     help="The [friction work](wear.md) of a contact in a cycle, at any frequency of the band.",
-    rows=_work_rows,
+    rows=lambda judged: _rows(judged, FRICTION_WORK, "FRICTION_WORK"),
     keys=(
         Key(
             name=_WORK, annotation=number_or_table("J", "contacts"), form=Form.NUMBER_OR_TABLE,
@@ -111,16 +98,7 @@ FRICTION_WORK = Criterion(
 _RATE, _COEFFICIENT = "max_wear_rate", "wear_coefficient"
 
 
-def _wear_rows(judged: Judged) -> list[CriterionRow]:
-    """A row for every local maximum that competes, of every contact that is limited."""
-    from solver.response.worst_wear import Measure
-
-    weight = judged.weight(WEAR_RATE) * judged.case.weight
-    each = judged.limit(WEAR_RATE) or {}
-    return worst_rows(judged, WEAR_RATE, Measure.FRICTION_POWER, each, weight)
-
-
-def _read_wear(asked: CriterionContext) -> Mapping[str, tuple[float | None, float]]:
+def _read_wear(asked: CriterionContext) -> Read:
     """The limit, if there is one, and the coefficient of every contact named."""
     from optim.problem.checks import DesignError
 
@@ -141,7 +119,7 @@ WEAR_RATE = Criterion(
     unit="m³/s",
     help="The volume that wears off a contact in a second, a coefficient times its friction power, at any "
     "frequency of the band; minimised times its `weight`.",
-    rows=_wear_rows,
+    rows=lambda judged: _rows(judged, WEAR_RATE, "FRICTION_POWER"),
     weight="wear",
     needs=_COEFFICIENT,
     keys=(

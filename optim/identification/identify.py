@@ -24,7 +24,7 @@ from optim.identification.information import (
 from optim.identification.model_check import doubts
 from optim.identification.reading import Given, read_data
 from optim.identification.unknowns import Unknowns, read_unknowns
-from optim.problem.checks import DataError, DesignError, is_number
+from optim.problem.checks import DataError, DesignError, is_number, whole
 from optim.problem.uncertainty_input import CONFIDENCE, read_uncertain
 from optim.problem.variables import Real
 from solver.balance.balance import check_harmonics
@@ -108,10 +108,8 @@ def check_fit(noise: float | None, starts: int, seed: int, harmonics: int) -> No
         raise DesignError(
             "noise", noise, "must be a relative standard deviation between 0 and 1, 0.02 for 2 %"
         )
-    for name, value, least, most in (("starts", starts, 1, MOST_STARTS), ("seed", seed, 0, 2**53)):
-        whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-        if not whole or not least <= value <= most:
-            raise DesignError(name, value, f"must be a whole number from {least} to {most}")
+    whole("starts", starts, least=1, most=MOST_STARTS)
+    whole("seed", seed, least=0, most=2**53)
     check_harmonics(harmonics)
 
 

@@ -7,12 +7,11 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Annotated
 
-from optim.problem.checks import DesignError, number_pair, positive, whole
+from optim.problem.checks import DesignError, positive, range_above_zero, whole
 from optim.problem.variables import BoundedVariable
 from solver.errors import Place, SettingError, at
 from solver.scene.scene import Scene
 
-_KEYS = ("name", "set", "band", "observe", "engine_order", "order", "weight")
 SAME = 1e-9  # relative, of a parameter that stays
 
 
@@ -49,16 +48,19 @@ class Case(Mapping[str, object]):
     weight: float | None = None
 
     def __getitem__(self, key: str) -> object:
-        value = getattr(self, key) if key in {one.name for one in fields(self)} else None
+        value = getattr(self, key) if key in _KEYS else None
         if value is None:
             raise KeyError(key)
         return value
 
     def __iter__(self) -> Iterator[str]:
-        return iter([one.name for one in fields(self) if getattr(self, one.name) is not None])
+        return iter([name for name in _KEYS if getattr(self, name) is not None])
 
     def __len__(self) -> int:
         return len(list(iter(self)))
+
+
+_KEYS = tuple(one.name for one in fields(Case))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -197,7 +199,8 @@ def read_case(
     for variable in variables:
         ends = (variable.low, variable.high)
         refuse_displaced(here, values, variable.paths, ends, (*where, "set"))
-    band = _band(where, table.get("band"))
+    band = table.get("band")
+    band = None if band is None else range_above_zero((*where, "band"), band, " [Hz]")
     order = whole((*where, "order"), table.get("order", max(here.engine_order, 1)), least=1)
     weight = positive((*where, "weight"), table.get("weight", 1.0))
     observed = table.get("observe", here.observe.dof)
@@ -240,12 +243,3 @@ def _observing(scene: Scene, where: Place, dof: str, band: tuple[float, float] |
         return changed
     with at(*where, "observe"):
         return Scene.from_dict(changed.to_dict())
-
-
-def _band(where: Place, band: object) -> tuple[float, float] | None:
-    if band is None:
-        return None
-    low, high = number_pair((*where, "band"), band)
-    if not 0.0 < low < high:
-        raise DesignError((*where, "band"), band, "must have 0 < low < high [Hz]")
-    return low, high

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from enum import Enum
+from numbers import Integral
 from typing import Literal, TypeGuard, TypeVar
 
 from solver.errors import Issue, Place, SettingError
@@ -109,6 +110,33 @@ def number_pair(name: str | Place, pair: object) -> tuple[float, float]:
     return float(pair[0]), float(pair[1])
 
 
+def range_above_zero(name: str | Place, pair: object, unit: str = "") -> tuple[float, float]:
+    """Return two numbers with 0 < low < high.
+
+    Raises
+    ------
+    DesignError
+        Anything else.
+    """
+    low, high = number_pair(name, pair)
+    if not 0.0 < low < high:
+        raise DesignError(name, pair, f"must have 0 < low < high{unit}")
+    return low, high
+
+
+def share(name: str | Place, value: object) -> float:
+    """Return a number between 0 and 1.
+
+    Raises
+    ------
+    DesignError
+        Anything else.
+    """
+    if not is_number(value) or not 0.0 < value < 1.0:
+        raise DesignError(name, value, "must be a number between 0 and 1")
+    return float(value)
+
+
 def word(name: str | Place, value: object, words: type[Chosen]) -> Chosen:
     """Return the member of an enum that a word, or itself, stands for.
 
@@ -123,17 +151,19 @@ def word(name: str | Place, value: object, words: type[Chosen]) -> Chosen:
     return words(value)
 
 
-def whole(name: str | Place, value: object, *, least: int) -> int:
-    """Return a whole number from `least` on.
+def whole(name: str | Place, value: object, *, least: int, most: int | None = None, more: str = "") -> int:
+    """Return a whole number from `least` on, up to `most`.
 
     Raises
     ------
     DesignError
-        Anything else.
+        Anything else; `more` says what it is.
     """
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise DesignError(name, value, f"must be a whole number >= {least}")
-    return value
+    good = isinstance(value, Integral) and not isinstance(value, bool) and value >= least
+    if not good or (most is not None and value > most):
+        wanted = f">= {least}" if most is None else f"from {least} to {most}"
+        raise DesignError(name, value, f"must be a whole number {wanted}{more}")
+    return int(value)
 
 
 def positive(name: str | Place, value: object) -> float:

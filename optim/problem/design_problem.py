@@ -17,7 +17,7 @@ from optim.criteria.criterion import (
 )
 from optim.criteria.peak_criterion import PEAK
 from optim.problem.cases import LoadCase, read_cases
-from optim.problem.checks import DesignError, is_number, positive, word
+from optim.problem.checks import DesignError, is_number, positive, whole, word
 from optim.problem.checks import Method as Method
 from optim.problem.problem_keys import BASINS, HARMONICS, MOST_BASINS, TOLERANCE
 from optim.problem.variables import BoundedVariable, beside_cases, check_variables
@@ -259,11 +259,7 @@ def _method(method: object) -> Method:
 
 
 def _basins(basins: object) -> int:
-    if basins is None:
-        return BASINS
-    if isinstance(basins, bool) or not isinstance(basins, int) or not 1 <= basins <= MOST_BASINS:
-        raise DesignError("basins", basins, f"must be a whole number from 1 to {MOST_BASINS}")
-    return basins
+    return BASINS if basins is None else whole("basins", basins, least=1, most=MOST_BASINS)
 
 
 def _tolerance(tolerance: object) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from optim.problem.cases import LoadCase, displaced
-from optim.problem.checks import DesignError, is_number
+from optim.problem.checks import DesignError, is_number, share
 from optim.problem.uncertainty_set import Coordinate, Disk, How, Scenario, UncertainSet, UncertaintyShape
 from optim.problem.variables import BoundedVariable, Real
 from solver.balance.parameter import Kind, resolve
@@ -230,10 +230,8 @@ def _confidence(table: Mapping[str, object], n: int) -> float:
         if "confidence" in table:
             raise DesignError((*_WHERE, "confidence"), table["confidence"], "needs a covariance")
         return 1.0
-    share = table.get("confidence", CONFIDENCE)
-    if not is_number(share) or not 0.0 < share < 1.0:
-        raise DesignError((*_WHERE, "confidence"), share, "must be a number between 0 and 1")
-    return math.sqrt(2.0 * float(gammaincinv(0.5 * n, share)))
+    confidence = share((*_WHERE, "confidence"), table.get("confidence", CONFIDENCE))
+    return math.sqrt(2.0 * float(gammaincinv(0.5 * n, confidence)))
 
 
 def _root(where: Place, given: object, n: int) -> Real:

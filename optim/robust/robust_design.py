@@ -22,7 +22,7 @@ from optim.criteria.peak_criterion import BAND, PEAK
 from optim.methods.enough_harmonics import most_harmonics
 from optim.methods.evaluator import SearchStoppedError
 from optim.methods.linearised import KEPT
-from optim.problem.checks import Aim, DesignError, Method, is_number, whole, word
+from optim.problem.checks import Aim, DesignError, Method, share, whole, word
 from optim.problem.design_problem import Limit, pose
 from optim.problem.problem_keys import FEWEST_SAMPLES, OPTIONS, QUANTILE, SEED, DesignKeys, keywords
 from optim.problem.uncertainty_input import check_settings, read_uncertain
@@ -161,7 +161,7 @@ def robust_design(
         raise DesignError("method", posed.method.value, "must be another one: a curve knows no uncertainty")
     over = read_uncertain(scene, posed.variables, uncertain, posed.cases)
     search = RobustSearch(
-        posed, over, word("aim", aim, Aim), _quantile(quantile), on_progress, should_stop, on_best
+        posed, over, word("aim", aim, Aim), share("quantile", quantile), on_progress, should_stop, on_best
     )
     wanted = SAMPLES[search.aim] if samples is None else whole("samples", samples, least=FEWEST_SAMPLES)
     drawn = over.draw(wanted, whole("seed", seed, least=0))
@@ -171,12 +171,6 @@ def robust_design(
     if on_progress is not None:
         on_progress(1.0, search.responses)
     return replace(found, seconds=clock() - begun)
-
-
-def _quantile(share: object) -> float:
-    if not is_number(share) or not 0.0 < share < 1.0:
-        raise DesignError("quantile", share, "must be a number between 0 and 1")
-    return float(share)
 
 
 @dataclass(slots=True, kw_only=True)

@@ -13,14 +13,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from optim.problem.cases import with_engine_order
-from optim.problem.checks import DesignError, number_pair
+from optim.problem.checks import DesignError, range_above_zero, whole
 from optim.results.studies_result import CampbellDiagram, CampbellStatus, Crossing, OrderResponse, Ranges
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Branch, BranchStatus, Peak
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.error_estimate import ErrorEstimator
-from solver.errors import Place
 from solver.jit.fourier import Real
 from solver.jit.timer import clock
 from solver.linear.natural_frequencies import natural_frequencies
@@ -29,6 +28,7 @@ from solver.scene.scene import Scene
 
 _MOST_ORDERS = 100
 _ROUNDING = 1e-9
+_ORDER = ", the excitations a revolution"
 
 
 @shows_progress("campbell")
@@ -65,7 +65,7 @@ def campbell_diagram(
     """
     begun = clock()
     speeds, chosen = _speeds(speeds_rpm), _orders(scene, orders)
-    looked_at = None if band_hz is None else _positive_pair("band_hz", band_hz, "Hz")
+    looked_at = None if band_hz is None else range_above_zero("band_hz", band_hz, " [Hz]")
     cyclic = scene.structure.has_sectors
     alone = cyclic or scene.speed_order is not None  # each order has a response of its own
     groups = [(order,) for order in chosen] if alone else [chosen]
@@ -116,7 +116,7 @@ def forbidden_hz(speeds_rpm: Sequence[float] | Sequence[Sequence[float]], order:
     DesignError
         Speeds that are not ranges above 0, or an order that is not a whole number above 0.
     """
-    return _scaled(_speeds(speeds_rpm), _order("order", order) / 60.0)
+    return _scaled(_speeds(speeds_rpm), whole("order", order, least=1, more=_ORDER) / 60.0)
 
 
 def _response(branch: Branch, order: int, speeds: Ranges, stuck: Real, free: Real) -> OrderResponse:
@@ -226,15 +226,8 @@ def _speeds(speeds_rpm: object) -> Ranges:
         raise DesignError("speeds_rpm", speeds_rpm, "must be [low, high] in 1/min, or a list of such ranges")
     if isinstance(speeds_rpm[0], Sequence):
         pairs = enumerate(speeds_rpm)
-        return tuple(sorted(_positive_pair(f"speeds_rpm[{i}]", pair, "1/min") for i, pair in pairs))
-    return (_positive_pair("speeds_rpm", speeds_rpm, "1/min"),)
-
-
-def _positive_pair(name: str, pair: object, unit: str) -> tuple[float, float]:
-    low, high = number_pair(name, pair)
-    if not 0.0 < low < high:
-        raise DesignError(name, pair, f"must have 0 < low < high [{unit}]")
-    return low, high
+        return tuple(sorted(range_above_zero(f"speeds_rpm[{i}]", pair, " [1/min]") for i, pair in pairs))
+    return (range_above_zero("speeds_rpm", speeds_rpm, " [1/min]"),)
 
 
 def _orders(scene: Scene, orders: object) -> tuple[int, ...]:
@@ -245,10 +238,4 @@ def _orders(scene: Scene, orders: object) -> tuple[int, ...]:
         raise DesignError("orders", orders, "must be a list of at least one whole number >= 1")
     if len(orders) > _MOST_ORDERS:
         raise DesignError("orders", len(orders), f"must be at most {_MOST_ORDERS} numbers")
-    return tuple(sorted({_order(("orders", i), order) for i, order in enumerate(orders)}))
-
-
-def _order(name: str | Place, order: object) -> int:
-    if isinstance(order, bool) or not isinstance(order, int) or order < 1:
-        raise DesignError(name, order, "must be a whole number >= 1, the excitations a revolution")
-    return order
+    return tuple(sorted({whole(("orders", i), one, least=1, more=_ORDER) for i, one in enumerate(orders)}))

@@ -22,7 +22,7 @@ from optim.criteria.peak_criterion import BAND, PEAK
 from optim.methods.enough_harmonics import only_if_known
 from optim.methods.evaluator import DesignSearch, SearchStoppedError
 from optim.methods.linearised import ACTIVE, Local, Model, bounds_held
-from optim.problem.checks import DesignError
+from optim.problem.checks import DesignError, whole
 from optim.problem.design_problem import Limit, Method, Problem, pose
 from optim.problem.problem_keys import FEWEST_POINTS, POINTS, FrontKeys, keywords
 from optim.problem.variables import BoundedVariable, scaled, unscaled
@@ -84,8 +84,7 @@ def pareto_front(
     """
     begun = clock()
     posed = replace(pose(scene, limits, **problem), keeps_measure=True)
-    if isinstance(points, bool) or not isinstance(points, int) or points < FEWEST_POINTS:
-        raise DesignError("points", points, f"must be a whole number >= {FEWEST_POINTS}")
+    whole("points", points, least=FEWEST_POINTS)
     if posed.method is Method.PERFORMANCE_CURVE:
         raise DesignError("method", posed.method.value, "must be another one: a curve knows no band")
     front = _Front(posed, points, on_progress, should_stop)
@@ -93,8 +92,11 @@ def pareto_front(
     if on_progress is not None:
         on_progress(1.0, max(front.reported, front.evaluations))
     kept, dominated = front_of(front.found)
+    claims = status in (ParetoStatus.COMPLETE, ParetoStatus.NO_TRADE_OFF)
+    if claims and any(point.design.status is DesignStatus.NOT_KNOWN for point in front.found):
+        status = ParetoStatus.NOT_KNOWN
     return ParetoResult(
-        problem=front.problem, status=_status_of_known(front, status), ends=tuple(front.ends), points=kept,
+        problem=front.problem, status=status, ends=tuple(front.ends), points=kept,
         dominated=dominated,
         missed=tuple(front.missed), evaluations=front.evaluations, seconds=clock() - begun,
     )  # fmt: skip
@@ -208,7 +210,8 @@ class _Front:
             self.missed.append(width)
             return
         result = DesignResult(
-            problem=limited, method=_used(self.problem.method), status=judge(local),
+            problem=limited, status=judge(local),
+            method=Method.IPOPT if self.problem.method is Method.IPOPT else Method.MINIMAX,
             evaluation=local.evaluation, conditions=local.conditions, basins=(),
             history=tuple(search.history[1:]),
             evaluations=len(search.history) - 1, work=float(len(search.history) - 1), seconds=0.0,
@@ -237,18 +240,6 @@ class _Front:
         local_search = local_search_of(search.problem.method)
         ends = [local_search(search, search.variables, evaluation, search.model) for evaluation in begin]
         return min(ends, key=lambda local: (local.standing, not local.settled))
-
-
-def _status_of_known(front: _Front, status: ParetoStatus) -> ParetoStatus:
-    """Return the status of a front that is called whole only if the peaks of its points are known."""
-    whole = status in (ParetoStatus.COMPLETE, ParetoStatus.NO_TRADE_OFF)
-    doubtful = any(point.design.status is DesignStatus.NOT_KNOWN for point in front.found)
-    return ParetoStatus.NOT_KNOWN if whole and doubtful else status
-
-
-def _used(method: Method) -> Method:
-    """Return the method that a search with a limit uses."""
-    return method if method is Method.IPOPT else Method.MINIMAX
 
 
 def _at_limit(evaluation: DesignEvaluation, width: float) -> DesignEvaluation:
