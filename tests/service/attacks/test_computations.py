@@ -117,18 +117,20 @@ LARGE: dict[str, Attack] = {
 }
 
 
-@pytest.mark.parametrize("name", DEEP)
-def test_what_is_nested_deeply_is_refused_with_the_limit(site: Site, name: str) -> None:
-    answer = site.send(DEEP[name])
-    assert answer.status in (400, 422), answer.body[:300]
-    assert b"64" in answer.body
+def refused(site: Site, attacks: dict[str, Attack], word: bytes) -> None:
+    answers = {name: site.send(attack) for name, attack in attacks.items()}
+    wrong = {
+        name: one for name, one in answers.items() if one.status not in (400, 422) or word not in one.body
+    }
+    assert wrong == {}
 
 
-@pytest.mark.parametrize("name", LARGE)
-def test_an_integer_of_thousands_of_digits_is_refused_with_its_place(site: Site, name: str) -> None:
-    answer = site.send(LARGE[name])
-    assert answer.status in (400, 422), answer.body[:300]
-    assert b"digits" in answer.body
+def test_what_is_nested_deeply_is_refused_with_the_limit(site: Site) -> None:
+    refused(site, DEEP, b"64")
+
+
+def test_an_integer_of_thousands_of_digits_is_refused_with_its_place(site: Site) -> None:
+    refused(site, LARGE, b"digits")
 
 
 @pytest.mark.long
@@ -142,7 +144,7 @@ def test_another_client_is_answered_while_one_computes(site: Site) -> None:
     def ask() -> int:
         return site.send(plan("two-dof"), site.other).status
 
-    assert site.meanwhile([plan(masses(1000))] * 3, ask, at_once=2) == 200
+    assert site.meanwhile([plan(masses(1000))] * 2, ask, at_once=2) == 200
 
 
 @pytest.mark.long

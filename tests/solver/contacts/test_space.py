@@ -220,7 +220,7 @@ def test_derivatives_on_both_sides_of_every_change():
 def test_second_derivatives_in_every_state():
     rng = np.random.default_rng(9)
     seen: Counter[int] = Counter()
-    for element in random_elements(6, 30):
+    for element in random_elements(6, 12):
         w, direction = rng.normal(size=element.U.shape), random_direction(rng, element)
         here, piece = gradient(element, w)
         exact, errors = second(element, w, direction), []

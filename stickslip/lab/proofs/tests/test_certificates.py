@@ -138,13 +138,11 @@ def _spoilt(raw: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
 
 
 def test_spoilt_certificates_are_rejected(proved: dict[str, Any]) -> None:
-    rng, refused = np.random.default_rng(7), 0
+    rng = np.random.default_rng(7)
     checker.check(proved)
     for _ in range(100):
         with pytest.raises(checker.RejectedError):
             checker.check(_spoilt(proved, rng))
-        refused += 1
-    assert refused == 100
 
 
 def test_many_events_are_proved_with_states_that_are_unknown_anew() -> None:
@@ -409,12 +407,12 @@ def test_the_least_peak_is_proved() -> None:
 
 
 def test_the_work_of_a_proof_is_limited() -> None:
-    """Seed 82 has 68 events: it ends where the work allowed is used up, at the same place each time."""
-    scene, hz = random_scene(82)
+    """Seed 38 has 36 events: it ends where the work allowed is used up, at the same place each time."""
+    scene, hz = random_scene(38)
     found = stickslip.solve(scene, frequency_hz=hz, harmonics=21)
-    ended = [stickslip.certify(found, most_work=5.0) for _ in range(2)]
+    ended = [stickslip.certify(found, most_work=1.0) for _ in range(2)]
     assert ended[0].status is stickslip.solutions.CertificateStatus.WORK_USED_UP
-    assert 5.0 < ended[0].work < 10.0
+    assert 1.0 < ended[0].work < 2.0
     assert ended[0].work == ended[1].work
     assert ended[0].certificate is None
 
