@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import own_laws
 import pytest
+from each import each
 from joined_scene import JOINED
 from launch import COMMAND
 
@@ -133,7 +134,7 @@ def test_its_limit_is_swept_and_designed(register: Register) -> None:
     assert along.amplitude[-1] == pytest.approx(amplitude("smooth", limit=0.9), rel=1e-6)
 
 
-@pytest.mark.parametrize(
+@each(
     ("given", "words"),
     [
         ({"name": "No Name"}, "lower-case letters"),

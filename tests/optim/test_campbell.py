@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from each import each
 from scene_cases import bladed_disk, mixed_disk, oscillator, two_dof
 
 import solver
@@ -173,7 +174,7 @@ def test_progress_and_stop() -> None:
     assert stopped.clear is not True
 
 
-@pytest.mark.parametrize(
+@each(
     ("arguments", "message"),
     [
         ({"speeds_rpm": (10.0, 5.0)}, r"`speeds_rpm` must have 0 < low < high"),
@@ -234,7 +235,7 @@ def test_pictures_are_written(
         assert "speed [rpm]" in picture.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
+@each(
     ("arguments", "word"),
     [
         ("two-dof --speeds 10 5", "`--speeds` must have low < high"),

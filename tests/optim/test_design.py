@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from each import each
 
 import optim
 import solver
@@ -162,7 +163,7 @@ def test_the_json_has_the_keys_of_the_contract() -> None:
     assert set(answer["peak"]) == {"value", "at"}  # type: ignore[call-overload]
 
 
-@pytest.mark.parametrize(
+@each(
     ("arguments", "words"),
     [
         ({"variables": {}}, ["variables"]),

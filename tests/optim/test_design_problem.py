@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from each import each
 
 import optim
 import solver
@@ -237,7 +238,7 @@ def test_a_design_that_fails_on_the_way_is_left_out() -> None:
     assert stopped.objective == np.inf
 
 
-@pytest.mark.parametrize(
+@each(
     ("arguments", "words"),
     [
         ({"variables": {"damper.N0,damper.nothing": (1.0, 2.0)}}, ["damper.nothing"]),

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 
 import optim
 import solver
@@ -227,7 +228,7 @@ def test_the_mass_is_that_of_the_bodies() -> None:
     assert not row.second().any()
 
 
-@pytest.mark.parametrize(
+@each(
     ("keys", "pointer", "message"),
     [
         ({"max_running_amplitude": 1.0}, "/running_rpm", "must be given with `max_running_amplitude`"),

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from each import each
 
 import optim
 import solver
@@ -16,7 +17,7 @@ TWO = solver.load_scene("two-dof")
 DISK = solver.load_scene("bladed-disk")
 
 
-@pytest.mark.parametrize(
+@each(
     ("uncertain", "words"),
     [
         ({}, ["uncertain"]),

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+from each import each
 
 import optim
 import solver
@@ -92,8 +93,8 @@ def numbers_of_peaks(told: Any, *, of_peak: bool = False) -> Iterator[float]:
         yield told
 
 
-@pytest.mark.parametrize("study", STUDIES)
-@pytest.mark.parametrize("scene", SCENES)
+@each("study", STUDIES)
+@each("scene", SCENES)
 def test_no_number_where_a_mode_is_driven_that_nothing_damps(scene: str, study: str) -> None:
     found = STUDIES[study](SCENES[scene]())
     assert found.status.name == "UNDAMPED"
@@ -124,9 +125,9 @@ def test_no_disk_without_damping_has_a_magnification(wave: int, study: str) -> N
     assert not list(numbers_of_peaks(found.to_json()))
 
 
-@pytest.mark.parametrize("every_branch", [True, False])
-@pytest.mark.parametrize("wave", [0, 1])
-@pytest.mark.parametrize("contacts", [[], [{**RUB, "between": ["tip", "tip@next"]}]])
+@each("every_branch", [True, False])
+@each("wave", [0, 1])
+@each("contacts", [[], [{**RUB, "between": ["tip", "tip@next"]}]])
 def test_no_blade_has_a_peak_beyond_what_friction_holds(
     contacts: list[dict[str, Any]], wave: int, every_branch: bool
 ) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from each import each
 from flint import arb, arb_mat
 
 import stickslip
@@ -33,7 +34,7 @@ def test_the_cases_are_what_their_schema_says() -> None:
         assert (case["name"], case["number"]) == (name, number)
 
 
-@pytest.mark.parametrize("name", names())
+@each("name", names())
 def test_a_case_becomes_a_scene_of_the_same_matrices(name: str) -> None:
     from solver.linear.assembly import linear_model
 

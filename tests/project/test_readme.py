@@ -211,7 +211,7 @@ def test_every_page_that_is_run_elsewhere_is() -> None:
         assert f'"{page}"' in (ROOT / "tests" / test).read_text(encoding="utf-8")
 
 
-@each(PAGES)
+@each("page", PAGES)
 def test_no_block_hides_from_the_tests(page: Path) -> None:
     """Fences say their language; what is indented instead is for another machine, not ours to run."""
     text = page.read_text(encoding="utf-8")
@@ -317,7 +317,7 @@ def names_of_tests() -> set[str]:
     return {name for file in files for name in re.findall(r"def (test_\w+)\(", file.read_text("utf-8"))}
 
 
-@each(PAGES)
+@each("page", PAGES)
 def test_modules_and_tests_that_a_page_names_exist(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     paths = re.findall(r"`((?:stickslip|solver|optim|service)(?:\.[a-zA-Z_]\w*)+)(?=[(`\[])", text)
@@ -333,7 +333,7 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@each(PAGES)
+@each("page", PAGES)
 def test_links_and_pictures_exist(page: Path) -> None:
     targets = re.findall(r"\]\(([^)]+)\)", page.read_text(encoding="utf-8"))
     missing = []
@@ -375,7 +375,7 @@ def test_a_page_knows_every_command() -> None:
     assert names == []
 
 
-@each(PAGES)
+@each("page", PAGES)
 def test_pages_call_public_names_by_the_public_face(page: Path) -> None:
     text = page.read_text("utf-8")
     names = {f"{home.__name__}.{name}" for home in (solver, optim) for name in home.__all__}

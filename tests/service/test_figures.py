@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 from typing import Any, get_args
 
 import pytest
+from each import each
 from private_kinds import A_SWEEP, PRIVATE
 from pydantic import BaseModel, Field
 from service_helpers import ServedClient, is_problem, listed, within
@@ -173,7 +174,7 @@ def test_what_is_stored_is_read_again(filled: tuple[Database, list[Owned]]) -> N
 WHERE = ("number", "id", "job_id", "position", "owner", "created")
 
 
-@pytest.mark.parametrize(
+@each(
     ("query", "pointer", "words"),
     [
         ({"of": "sweeep"}, "/of", "did you mean `sweep`?"),

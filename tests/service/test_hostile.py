@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 import uvicorn
+from each import each
 from private_kinds import PRIVATE
 from service_helpers import ServedClient, promptly, serving, until
 
@@ -146,7 +147,7 @@ BODIES: dict[str, bytes] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", BODIES)
+@each("name", BODIES)
 def test_a_hostile_body_is_refused(service: ServedClient, name: str) -> None:
     before = service.get("/v1/scenes").json()["items"]
     headers = {"Content-Type": "application/json"}
@@ -197,7 +198,7 @@ PATHS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("path", PATHS)
+@each("path", PATHS)
 def test_a_path_or_query_with_tricks_finds_nothing(service: ServedClient, path: str) -> None:
     request = f"GET {path.replace(' ', '%20')} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
     status, found = answered(service, request.encode())
@@ -226,7 +227,7 @@ HEADERS = {
 }
 
 
-@pytest.mark.parametrize("name", HEADERS)
+@each("name", HEADERS)
 def test_a_hostile_header_is_refused(service: ServedClient, name: str) -> None:
     sent = post("/v1/jobs", JSON + "Connection: close\r\n" + HEADERS[name], b'{"kind": "none"}')
     status, found = answered(service, sent)
@@ -255,7 +256,7 @@ SMUGGLED = {
 }
 
 
-@pytest.mark.parametrize("name", SMUGGLED)
+@each("name", SMUGGLED)
 def test_a_request_out_of_form_is_refused(service: ServedClient, name: str) -> None:
     status, found = answered(service, SMUGGLED[name])
     assert status == 0 or 400 <= status < 500, found[:300]

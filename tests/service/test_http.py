@@ -8,6 +8,7 @@ import time
 
 import httpx
 import pytest
+from each import each
 from service_helpers import is_problem, job_ids, promptly, until
 from starlette.requests import Request
 
@@ -122,7 +123,7 @@ def test_a_key_used_at_the_same_time_makes_one_job(http: httpx.Client) -> None:
     assert len(set(found)) == 1
 
 
-@pytest.mark.parametrize(
+@each(
     ("body", "pointer", "words"),
     [
         ({}, "/kind", "`kind` is missing"),
@@ -163,7 +164,7 @@ def test_numbers_that_are_not_finite_are_refused(http: httpx.Client, text: str, 
     assert [entry["pointer"] for entry in problem["errors"]] == pointers
 
 
-@pytest.mark.parametrize(
+@each(
     "content",
     [
         b"",

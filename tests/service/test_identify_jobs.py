@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import pytest
+from each import each
 from service_helpers import Shipped
 
 from service.cli.commands.client import submit
@@ -31,7 +32,7 @@ def test_it_finds_what_the_data_say() -> None:
     assert Identify.draw(output.result, (), lambda _: None).axes  # type: ignore[arg-type, return-value]
 
 
-@pytest.mark.parametrize(
+@each(
     ("changes", "pointer"),
     [
         ({"data": [{"frequency": [1.0, 0.9, 1.2], "amplitude": [1, 1, 1]}]}, "/data/0"),

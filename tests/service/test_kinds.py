@@ -5,6 +5,7 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
+from each import each
 from service_helpers import is_problem, job_ids
 
 import solver
@@ -158,7 +159,7 @@ SOLVE: dict[str, Any] = {"kind": "solve", "scene": "two-dof", "frequency_hz": 1.
 N0 = {**SWEEP, "parameter": "shroud.N0", "from": 20, "to": 300, "frequency_hz": 755.0}
 
 
-@pytest.mark.parametrize(
+@each(
     ("body", "pointers"),
     [
         ({"kind": "sweep"}, ["/scene"]),

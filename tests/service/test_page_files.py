@@ -89,7 +89,7 @@ def test_the_page_has_words_for_every_flag() -> None:
     assert told["not_unique"] == FLAGS["not_unique"]
 
 
-@each(MODULES)
+@each("path", MODULES)
 def test_modules_are_short_and_put_no_data_into_markup(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert len(text.splitlines()) <= LONGEST_FILE

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-import pytest
+from each import each
 from service_helpers import with_tables
 from sqlalchemy import Select, Update
 from sqlalchemy.dialects import sqlite
@@ -13,7 +13,7 @@ from service.db.repositories import attempts, owned, waiting
 BY_KEY = "sqlite_autoindex_job_1"
 
 
-@pytest.mark.parametrize(
+@each(
     ("statement", "index"),
     [
         (attempts.COMPUTED_BEFORE, "ix_job_spec_hash_state"),

@@ -8,6 +8,7 @@ from pathlib import Path
 import httpx
 import numpy as np
 import pytest
+from each import each
 from hypothesis import given
 from hypothesis import strategies as st
 from service_helpers import is_problem
@@ -27,7 +28,7 @@ FORMS = {
 }
 
 
-@pytest.mark.parametrize(
+@each(
     ("accept", "wanted"),
     [
         (None, "application/json"),

@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-import pytest
+from each import each
 from service_helpers import Shipped
 
 import solver
@@ -141,7 +141,7 @@ SOMETIMES = {
 }
 
 
-@pytest.mark.parametrize("case", BODIES)
+@each("case", BODIES)
 def test_a_result_is_what_its_schema_says(case: str) -> None:
     name, body = BODIES[case]
     kind = SHIPPED[name]

@@ -3,6 +3,7 @@
 import socket
 
 import pytest
+from each import each
 
 from service.db.engine import database_name
 from service.errors import ConfigurationError
@@ -32,7 +33,7 @@ def test_every_setting_is_described() -> None:
     assert all(field.description for field in Settings.model_fields.values())
 
 
-@pytest.mark.parametrize(
+@each(
     ("values", "words"),
     [
         (

@@ -4,6 +4,7 @@ from typing import Any
 
 import httpx
 import pytest
+from each import each
 from service_helpers import is_problem, job_ids, until
 
 import optim
@@ -148,7 +149,7 @@ def smooth() -> dict[str, Any]:
     return scene
 
 
-@pytest.mark.parametrize(
+@each(
     ("body", "pointers"),
     [
         ({"kind": "map"}, ["/scene", "/parameter", "/from", "/to"]),

@@ -6,7 +6,7 @@ import inspect
 import pickle
 from collections.abc import Iterator, Mapping
 
-import pytest
+from each import each
 
 from optim.problem.problem_keys import options
 from service.cli.options.key_options import key_options, options_of
@@ -73,7 +73,7 @@ def defaults(study: type[Study]) -> Iterator[tuple[str, object, object]]:
             yield key, field.default, known[key].default
 
 
-@pytest.mark.parametrize("name", STUDIES)
+@each("name", STUDIES)
 def test_every_face_has_the_same_keys(name: str) -> None:
     study, own = STUDIES[name], set(STUDIES[name].own_keys())
     known = set(parameters(study))
@@ -96,7 +96,7 @@ def test_every_face_has_the_same_keys(name: str) -> None:
     assert body.model_json_schema()["properties"].keys() == keys
 
 
-@pytest.mark.parametrize("name", STUDIES)
+@each("name", STUDIES)
 def test_what_is_left_out_is_the_same_everywhere(name: str) -> None:
     """A default of a body, shown by the command, is that of the function."""
     for key, of_body, of_function in defaults(STUDIES[name]):
@@ -104,7 +104,7 @@ def test_what_is_left_out_is_the_same_everywhere(name: str) -> None:
         assert of_body == of_function or unsaid, key
 
 
-@pytest.mark.parametrize("name", STUDIES)
+@each("name", STUDIES)
 def test_a_worker_is_sent_it_by_name(name: str) -> None:
     kind = SHIPPED[name]
     assert pickle.loads(pickle.dumps((kind.request, kind.resolve))) == (kind.request, kind.resolve)

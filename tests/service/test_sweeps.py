@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from private_kinds import A_SWEEP
 from service_helpers import analyse, promptly
 
@@ -76,7 +77,7 @@ def test_a_range_is_met_by_one_contact_alone(database: Database) -> None:
     assert SweepDetail.load(whole, repository).arrays == {"mean": [1.0, None]}
 
 
-@pytest.mark.parametrize(
+@each(
     "cursor", ["", "x", "eA", "W10", "WzEsMl0", "W3RydWUsICJhIl0", "W051bGwsICJhIl0", "é", "WyJhIiwgImEiXQ"]
 )
 def test_a_cursor_that_is_none(module_database: Database, cursor: str) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import httpx
 import pytest
+from each import each
 from service_helpers import ServedClient, is_problem, new_job, until
 from sqlalchemy import delete, update
 
@@ -86,7 +87,7 @@ def test_names_are_no_part_of_what_is_computed(http: ServedClient) -> None:
     assert "name" not in http.service.jobs.spec(plain["id"])
 
 
-@pytest.mark.parametrize(
+@each(
     ("words", "pointer", "detail"),
     [
         (

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from measured_cases import TWO_DOF, incremental_loop, table, two_dof_runs
 
 import optim
@@ -170,7 +171,7 @@ def test_it_can_be_stopped() -> None:
     assert not found.fitted
 
 
-@pytest.mark.parametrize(
+@each(
     ("arguments", "words"),
     [
         ({"unknowns": {}}, ["unknowns", "at least one"]),

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyuff
+from each import each
 from measured_files import HERTZ, MOTION, UNITS, Measured, Text, Universal
 
 import solver
@@ -211,7 +212,7 @@ def columns_of(style: Universal | Text) -> list[str]:
     return told
 
 
-@pytest.mark.parametrize("name", FILES)
+@each("name", FILES)
 def test_each_is_read_right_or_refused_by_its_name(tmp_path: Path, name: str) -> None:
     style, wanted = FILES[name]
     found = outcome(tmp_path, style)

@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import pyuff
+from each import each
 
 import optim
 import solver
@@ -90,7 +91,7 @@ def test_universal_files_are_read(tmp_path: Path, binary: bool) -> None:
     assert run.data == pytest.approx(50.0 * receptance, rel=1e-5)
 
 
-@pytest.mark.parametrize(
+@each(
     ("text", "words"),
     [
         ("", ["column heads"]),
@@ -151,7 +152,7 @@ def test_amplitudes_in_millimetres_without_their_unit_are_told() -> None:
         optim.identify(SCENE, data, {"damper.mu": (0.1, 0.6)}, harmonics=3, starts=1)
 
 
-@pytest.mark.parametrize(
+@each(
     ("data", "words"),
     [
         ([], ["data", "at least one"]),

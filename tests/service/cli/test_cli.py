@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from each import each
 from launch import COMMAND
 
 import optim
@@ -71,7 +72,7 @@ def test_design_takes_several_variables(run: Run) -> None:
     assert 90.0 <= answer["optimum"]["damper.N0"] <= 120.0
 
 
-@pytest.mark.parametrize(
+@each(
     ("arguments", "words"),
     [
         ("scenes", ["bladed-disk", "cyclic", "500 to 900 Hz"]),
@@ -117,8 +118,8 @@ BAD_SCENES = {
 }
 
 
-@pytest.mark.parametrize("case", BAD_SCENES)
-@pytest.mark.parametrize("command", ["solve scene.toml --frequency 1", "design scene.toml --json"])
+@each("case", BAD_SCENES)
+@each("command", ["solve scene.toml --frequency 1", "design scene.toml --json"])
 def test_bad_scenes_are_named(run: Run, tmp_path: Path, command: str, case: str) -> None:
     right, wrong, words = BAD_SCENES[case]
     text = GOOD.read_text()
@@ -131,7 +132,7 @@ def test_bad_scenes_are_named(run: Run, tmp_path: Path, command: str, case: str)
     assert [file.name for file in tmp_path.iterdir()] == ["scene.toml"]
 
 
-@pytest.mark.parametrize(
+@each(
     ("arguments", "words"),
     [
         ("solve nowhere.toml --frequency 1", ["nowhere.toml"]),
@@ -238,7 +239,7 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize("case", FILES)
+@each("case", FILES)
 def test_what_is_wrong_in_a_problem_file_is_told_by_its_key(run: Run, tmp_path: Path, case: str) -> None:
     text, words = FILES[case]
     file = tmp_path / ("problem.json" if text.startswith(("{", "[1")) else "problem.toml")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from each import each
 
 import optim
 import solver
@@ -168,7 +169,7 @@ def test_a_stored_result_is_drawn_as_the_computed_one() -> None:
         ]
 
 
-@pytest.mark.parametrize(
+@each(
     "kind",
     ["sweep", "design", "campbell", "accuracy", "pareto", "solve", "mistuning", "modes", "interference"],
 )

@@ -71,7 +71,7 @@ ENTRIES = [
 ]
 
 
-@each(ENTRIES)
+@each("entry", ENTRIES)
 def test_the_table_says_what_the_commands_say(entry: CommandEntry) -> None:
     """The summary in the list of commands is the first line of the command's own help."""
     text = inspect.getdoc(entry.function())

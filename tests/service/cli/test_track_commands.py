@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from each import each
 
 import solver
 from service.cli import main
@@ -28,7 +29,7 @@ def test_words_name_the_least_peak_and_a_picture_is_written(
     assert err == ""
 
 
-@pytest.mark.parametrize(
+@each(
     ("arguments", "word"),
     [
         ("peaks two-dof --parameter damper.N7 --from 1 --to 2", "damper.N7"),

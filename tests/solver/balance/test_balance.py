@@ -8,6 +8,7 @@ import numba
 import numpy as np
 import pytest
 from contact_cases import central_difference
+from each import each
 from scene_cases import (
     bladed_disk,
     critically_damped,
@@ -84,7 +85,7 @@ def steps(p: float) -> list[float]:
     return [size * max(abs(p), 0.1) for size in (1e-4, 1e-5, 1e-6)]
 
 
-@pytest.mark.parametrize("name", SCENES)
+@each("name", SCENES)
 def test_residual_against_a_direct_evaluation(name: str):
     """r = u − L Z⁻¹ (f̂ − Lᴴ (F̂ − s û)) with Z of the whole structure, harmonic by harmonic."""
     here = point(name)
@@ -125,7 +126,7 @@ def test_every_balance_has_the_same_types():
     assert len(types) == 1
 
 
-@pytest.mark.parametrize("name", SCENES)
+@each("name", SCENES)
 def test_jacobian(name: str):
     here = point(name)
     _, evaluation = here.workspace.evaluate(here.u, here.p)
@@ -142,7 +143,7 @@ def test_jacobian(name: str):
     assert best < 1e-6
 
 
-@pytest.mark.parametrize(("name", "path"), CASES)
+@each(("name", "path"), CASES)
 def test_derivative_by_a_parameter(name: str, path: str):
     here = point(name, path)
     _, evaluation = here.workspace.evaluate(here.u, here.p)
@@ -157,7 +158,7 @@ def test_derivative_by_a_parameter(name: str, path: str):
 
 
 # Where contacts alone hold a part, their kt is also in the form of the equations, not only in their solution.
-@pytest.mark.parametrize(("name", "path"), [case for case in CASES if case not in LOOSE_KT])
+@each(("name", "path"), [case for case in CASES if case not in LOOSE_KT])
 def test_a_moved_parameter_is_a_moved_scene(name: str, path: str):
     """λ at another value gives the residual of a scene written with that value."""
     here = point(name, path)
@@ -174,7 +175,7 @@ def test_a_moved_parameter_is_a_moved_scene(name: str, path: str):
     np.testing.assert_allclose(evaluation.residual, expected.residual, atol=1e-10 * scale)
 
 
-@pytest.mark.parametrize(("name", "path"), [case for case in CASES if case[1] != "frequency"])
+@each(("name", "path"), [case for case in CASES if case[1] != "frequency"])
 def test_another_parameter_of_the_same_balance(name: str, path: str):
     here, start = point(name, path), build(SCENES[name][0], harmonics=HARMONICS)
     moved = Workspace.of(for_parameter(start, path, SCENES[name][1]))
@@ -185,7 +186,7 @@ def test_another_parameter_of_the_same_balance(name: str, path: str):
     np.testing.assert_allclose(got.dr_dp, expected.dr_dp, atol=1e-8 * np.abs(expected.dr_dp).max())
 
 
-@pytest.mark.parametrize(("name", "path"), CASES)
+@each(("name", "path"), CASES)
 def test_slopes_through_the_whole_solve(name: str, path: str):
     """d max|x| / dλ and d half-range / dλ of the solution against solving again at λ ± h."""
     here = point(name, path, perturbed=0.0)

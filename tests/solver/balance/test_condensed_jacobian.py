@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from each import each
 from scene_cases import bladed_disk, mixed_disk, two_dof
 
 from solver.balance.balance import build
@@ -116,7 +117,7 @@ def test_solves_as_the_whole_jacobian_with_a_border(
         assert x[part] == pytest.approx(exact[part], rel=1e-8, abs=1e-9 * np.abs(exact[part]).max())
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 7, 24, 36, 37, 60])
+@each("n", [1, 2, 3, 4, 5, 7, 24, 36, 37, 60])
 def test_both_sides_of_one_factorisation(n: int) -> None:
     """Below and above the size from which LAPACK factorises."""
     rng = np.random.default_rng(n)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from other_units import in_other_units
 from scene_cases import DISK_ROWS, bladed_disk, loose_mass, mixed_disk, oscillator, row_scene, two_dof
 
@@ -182,8 +183,8 @@ def test_linear_limits(name: str, stuck: bool):
     )
 
 
-@pytest.mark.parametrize("name", ["slipping", "separating", "separating, stiff", "disk", "disk, separating"])
-@pytest.mark.parametrize("turn", [0.1, 1.7, -2.5])
+@each("name", ["slipping", "separating", "separating, stiff", "disk", "disk, separating"])
+@each("turn", [0.1, 1.7, -2.5])
 def test_shift_of_the_origin_of_time(name: str, turn: float):
     scene, frequency_hz = CASES[name]
     later = scene.with_values(
@@ -350,7 +351,7 @@ def test_a_load_that_touches_zero_does_not_open_by_rounding(loads: dict[str, Any
     np.testing.assert_allclose([each.max_abs for each in found], found[0].max_abs, rtol=1e-10)
 
 
-@pytest.mark.parametrize("phase", np.linspace(-3.0, 3.0, 13).tolist())
+@each("phase", np.linspace(-3.0, 3.0, 13).tolist())
 def test_a_part_at_rest_under_a_load_that_touches_zero_stays(phase: float):
     """Rounding decided whether the contact that alone holds it held anything."""
     raw = loose_mass().to_dict()

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from contact_cases import Case, central_difference, evaluate, random_case
+from each import each
 from scene_cases import bladed_disk, loose_mass, two_dof
 
 from solver import Scene, SettingError, solve
@@ -89,8 +90,8 @@ def test_it_is_the_classic_scheme(samples: int):
     assert {events.STUCK, events.SLIPPING, events.LIFTING} <= states
 
 
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("samples", [64, 1024])
+@each("name", NAMES)
+@each("samples", [64, 1024])
 def test_its_derivatives_are_those_of_the_scheme(name: str, samples: int):
     case = reference_case(name)
     here = by_samples(case, samples)

@@ -16,6 +16,7 @@ from contact_cases import (
     random_case,
     values,
 )
+from each import each
 from force_cases import NAMES, REFERENCE, TRANSITIONS, critical, reference_case
 
 from solver.contacts.kernels import stick_slip_events as events
@@ -61,9 +62,9 @@ def test_every_random_contact_has_an_answer(harmonics: int):
         assert np.isfinite(evaluate(random_case(rng, harmonics)).F).all()
 
 
-@pytest.mark.parametrize("kt_over_limit", [0.5, 1.0, 3.0, 1e4])
-@pytest.mark.parametrize("N0", [0.0, 1e-12, 99.0, 100.0 * (1 - 1e-15), 100.0, 100.0 * (1 + 1e-15), 300.0])
-@pytest.mark.parametrize("mu", [0.0, 0.3])
+@each("kt_over_limit", [0.5, 1.0, 3.0, 1e4])
+@each("N0", [0.0, 1e-12, 99.0, 100.0 * (1 - 1e-15), 100.0, 100.0 * (1 + 1e-15), 300.0])
+@each("mu", [0.0, 0.3])
 def test_ties(kt_over_limit: float, N0: float, mu: float):
     """Limits reached exactly, loads that touch zero, motion in phase with the load, no friction."""
     for phase, motion in ((0.0, (1.0, 0.0)), (np.pi / 2, (1.0, 0.5)), (np.pi, (1.0, 0.0)), (1.0, (0.0, 0.0))):
@@ -99,8 +100,8 @@ def test_derivatives_of_random_contacts():
     assert min(seen[state] for state in ("stuck", "slipping", "lifting", "separated")) >= 3
 
 
-@pytest.mark.parametrize("distance", [-1e-2, -1e-4, 1e-4, 1e-2])
-@pytest.mark.parametrize("name", TRANSITIONS)
+@each("distance", [-1e-2, -1e-4, 1e-4, 1e-2])
+@each("name", TRANSITIONS)
 def test_derivatives_on_both_sides_of_a_transition(name: str, distance: float):
     transition = TRANSITIONS[name]
     case = transition.family(critical(transition) + abs(transition.high) * distance)
@@ -110,7 +111,7 @@ def test_derivatives_on_both_sides_of_a_transition(name: str, distance: float):
     assert max(errors.values()) < 1e-6, errors
 
 
-@pytest.mark.parametrize("name", TRANSITIONS)
+@each("name", TRANSITIONS)
 def test_the_force_is_continuous_across_a_transition(name: str):
     transition = TRANSITIONS[name]
     x = critical(transition)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from lumped_structure import lumped
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -54,7 +55,7 @@ def test_a_mass_rebounds_as_published(speed: float, chi: float) -> None:
     assert left == pytest.approx(expected, rel=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(10))
+@each("seed", range(10))
 def test_slopes_are_differences(seed: int) -> None:
     rng = np.random.default_rng(seed)
     at = np.array([*rng.normal(size=2), *rng.uniform(0.1, 3.0, size=3)])

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from law_scene_cases import CUBIC, GAP, PLANE, RUB, scene
 
 from solver.contacts.kernels import columns
@@ -47,7 +48,7 @@ def test_every_parameter_is_a_field_of_the_scene() -> None:
         assert law.PARAMETERS.keys() <= law.model_fields.keys()
 
 
-@pytest.mark.parametrize("case", LEFT_OUT)
+@each("case", LEFT_OUT)
 def test_what_is_left_out_is_the_product_said(case: str) -> None:
     (contact,) = scene(LEFT_OUT[case]).contacts
     for key, quantity in contact.PARAMETERS.items():
@@ -56,7 +57,7 @@ def test_what_is_left_out_is_the_product_said(case: str) -> None:
             assert contact.value_of(key) == pytest.approx(product)
 
 
-@pytest.mark.parametrize("case", LEFT_OUT)
+@each("case", LEFT_OUT)
 def test_sliders_cover_values_that_a_scene_may_have(case: str) -> None:
     found = scene(LEFT_OUT[case])
     (contact,) = found.contacts

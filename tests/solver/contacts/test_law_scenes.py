@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from law_scene_cases import CUBIC, GAP, PLANE, RUB, cyclic, scene
 
 from solver import annulus, hysteresis_loop, march, plan, power_balance, solve, sweep
@@ -68,7 +69,7 @@ def test_parameter_paths_follow_the_law():
 EVERY = scene(RUB, PLANE, {**PLANE, "limit": "box", "N1": 0.5}, GAP, CUBIC)
 
 
-@pytest.mark.parametrize(
+@each(
     "path",
     ["frequency", "excitation.amplitude", "c0.kn", "c0.kt", "c0.mu", "c0.N0", "c0.N1", "c0.N1_ratio", "c1.kt",
      "c1.mu", "c1.N0", "c1.N1", "c2.kt", "c2.N1_phase", "c3.k", "c3.gap", "c4.a1", "c4.a2", "c4.a3", "c4.a7"],
@@ -102,7 +103,7 @@ def test_balance_jacobian_with_every_law():
         np.testing.assert_allclose(exact[:, i], (both[0] - both[1]) / 2e-6, atol=2e-5)
 
 
-@pytest.mark.parametrize(
+@each(
     ("contact", "harmonics", "frequency", "accuracy"),
     [
         (GAP, 31, 0.13, 2e-6),

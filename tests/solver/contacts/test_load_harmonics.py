@@ -6,6 +6,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from each import each
 from law_cases import COULOMB_CIRCLE
 from load_scenes import fourier_load, loaded, random_loads
 
@@ -64,7 +65,7 @@ def test_every_harmonic_is_a_path() -> None:
         found.value("c.N9")
 
 
-@pytest.mark.parametrize(
+@each(
     ("load", "message"),
     [
         ([8.0, 5.0], r"`load` must have its mean first and then tables, got 5\.0"),

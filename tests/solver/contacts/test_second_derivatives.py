@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from contact_cases import STATES, Case, central_difference, evaluate, random_case
+from each import each
 from force_cases import NAMES, TRANSITIONS, critical, reference_case
 
 import solver
@@ -103,8 +104,8 @@ def test_second_derivatives_of_reference_contacts(name: str) -> None:
     assert best_error(reference_case(name), np.random.default_rng(0), with_load=True) < 1e-6
 
 
-@pytest.mark.parametrize("distance", [-1e-2, -1e-3, 1e-3, 1e-2])
-@pytest.mark.parametrize("name", TRANSITIONS)
+@each("distance", [-1e-2, -1e-3, 1e-3, 1e-2])
+@each("name", TRANSITIONS)
 def test_second_derivatives_on_both_sides_of_a_transition(name: str, distance: float) -> None:
     transition = TRANSITIONS[name]
     case = transition.family(critical(transition) + abs(transition.high) * distance)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from each import each
 from law_cases import (
     COULOMB_BOX,
     COULOMB_CIRCLE,
@@ -183,7 +184,7 @@ def test_second_derivatives_equal_differences_of_the_gradient(name: str, count: 
     assert len(seen) >= (1 if name == "polynomial" else 2)
 
 
-@pytest.mark.parametrize("name", LAWS)
+@each("name", LAWS)
 def test_second_derivatives_of_laws_are_symmetric(name: str) -> None:
     """aᵀ ∂²(w·F) b = bᵀ ∂²(w·F) a over motions, numbers and load."""
     law, rng = LAWS[name], np.random.default_rng(6)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from lumped_structure import lumped
 from scipy.integrate import quad, solve_ivp
 from scipy.io import savemat
@@ -44,7 +45,7 @@ def force_of(contacts: list[dict[str, Any]], dofs: list[str], x: Array) -> Array
     return found
 
 
-@pytest.mark.parametrize("seed", range(30))
+@each("seed", range(30))
 def test_the_springs_have_the_force_of_the_tensors(seed: int) -> None:
     rng = np.random.default_rng(seed)
     n, sizes = int(rng.integers(1, 6)), 10.0 ** rng.uniform(-3, 3, size=5)

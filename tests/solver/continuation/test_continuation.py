@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from contact_cases import central_difference
+from each import each
 from lumped_structure import lumped
 from scene_cases import bladed_disk, loose_mass, mixed_disk, oscillator, two_dof
 from walked_branches import UNSTABLE, walked, with_damping
@@ -193,8 +194,8 @@ def test_cusps(contact: dict[str, float], c: float, harmonics: int):
     assert branch.reached
 
 
-@pytest.mark.parametrize("predictor", Predictor)
-@pytest.mark.parametrize("harmonics", [3, 11, 21])
+@each("predictor", Predictor)
+@each("harmonics", [3, 11, 21])
 def test_the_known_kink(harmonics: int, predictor: Predictor):
     """Edge of full stick near 1.610 Hz, where both limits touch at once."""
     k1, k2 = 4.0 * math.pi**2, 2.0 * math.pi**2
@@ -239,8 +240,8 @@ def test_tangents_against_solving_again(
         assert slope == pytest.approx(measures.values[3], rel=1e-8)
 
 
-@pytest.mark.parametrize("predictor", Predictor)
-@pytest.mark.parametrize(
+@each("predictor", Predictor)
+@each(
     ("path", "damping", "ends", "frequency_hz", "turns"),
     [
         ("frequency", -0.02, (0.05, 0.4), None, (0.17265, 0.17113)),

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from scene_cases import bladed_disk, oscillator, two_dof
 
 from solver import BranchStatus, ContinuationSettings, SettingError, sweep
@@ -121,7 +122,7 @@ def test_what_a_branch_holds():
     assert obj["unit"] == "Hz"
 
 
-@pytest.mark.parametrize(
+@each(
     ("arguments", "name", "value"),
     [
         ({"start": 0.0, "stop": 1.0}, "start", 0.0),

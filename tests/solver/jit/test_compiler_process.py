@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from each import each
 
 import solver
 from solver.jit import compiler_process
@@ -97,7 +98,7 @@ def test_where_the_compiler_fails_nobody_waits_for_ever(folder: Path) -> None:
     assert said.count("waits for the compiler") > 1
 
 
-@pytest.mark.parametrize(
+@each(
     ("kind", "scene", "asked", "small"),
     [
         ("solve", "two-dof", {"frequency_hz": 1.0}, True),

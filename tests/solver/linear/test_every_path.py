@@ -63,7 +63,7 @@ def paths_of(scene: Scene) -> list[str]:
     return [path for path in paths if not path.endswith(".kn") or scene.value(path) > 0.0]
 
 
-@each(SCENES)
+@each("name", SCENES)
 def test_a_value_is_read_as_it_was_set(name: str) -> None:
     scene = SCENES[name]
     for path in paths_of(scene):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from lumped_structure import lumped
 from scipy.integrate import solve_ivp
 
@@ -43,8 +44,8 @@ def scene(values: dict[str, float] | None = None, **more: Any) -> solver.Scene:
     return solver.Scene.from_dict({**SCENE, **more}).with_values(values or {})
 
 
-@pytest.mark.parametrize("tau", [1e-3, 0.2, 1.0, 7.0, 1e4])
-@pytest.mark.parametrize("hz", [0.05, 0.2, 1.7])
+@each("tau", [1e-3, 0.2, 1.0, 7.0, 1e4])
+@each("hz", [0.05, 0.2, 1.7])
 def test_an_oscillator_with_a_branch_is_its_closed_form(hz: float, tau: float) -> None:
     one = {
         "structure": lumped({"a": 2.0}, ("a", "ground", 3.0)), "contacts": [],
@@ -79,7 +80,7 @@ def random_matrix(rng: np.random.Generator) -> tuple[dict[str, Any], np.ndarray,
     return raw, np.stack([np.diag(list(masses.values())), K, C]), patterns
 
 
-@pytest.mark.parametrize("seed", range(20))
+@each("seed", range(20))
 def test_random_structures_are_the_complex_matrix(seed: int) -> None:
     rng = np.random.default_rng(seed)
     raw, (M, K, C), patterns = random_matrix(rng)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 
 import solver
 from solver.balance.balance import build
@@ -40,9 +41,9 @@ def driven(**more: Any) -> dict[str, Any]:
     return rig(structure=structure, excitation={"driven": {"floor": 1.0}, "amplitude": 0.7}, **more)
 
 
-@pytest.mark.parametrize("way", [rig, driven])
-@pytest.mark.parametrize("relative", [False, True])
-@pytest.mark.parametrize("motion", list(ORDERS))
+@each("way", [rig, driven])
+@each("relative", [False, True])
+@each("motion", list(ORDERS))
 def test_a_moving_base_is_the_absolute_motion(way: Any, motion: str, relative: bool) -> None:
     """In absolute motion springs and dashpots to the ground push with (k + iωc) y."""
     raw = way()
@@ -260,7 +261,7 @@ def test_gradients_where_patterns_differ(ground: bool) -> None:
     assert "contacts" in solver.plan(scene, harmonics=3).to_json()
 
 
-@pytest.mark.parametrize("seed", range(40))
+@each("seed", range(40))
 def test_random_patterns(seed: int) -> None:
     raw = shaken_at_random(seed)
     raw["observe"] = {"dof": "y", "band": [0.3, 2.0], "relative": seed % 4 > 1}

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from scipy.linalg import eigvalsh
 
 from solver.errors import SettingError
@@ -126,8 +127,8 @@ def test_a_spring_reads_the_same_from_both_ends():
     np.testing.assert_allclose(np.diag(model.K0), [22.0, 12.0])
 
 
-@pytest.mark.parametrize("kind", ["lumped", "cyclic"])
-@pytest.mark.parametrize("name", ["k1", "k2", "d1", "ma"])
+@each("kind", ["lumped", "cyclic"])
+@each("name", ["k1", "k2", "d1", "ma"])
 def test_derivatives_against_central_differences(kind: str, name: str):
     scene = mixed(kind)
     path, h = f"structure.{name}", 1e-3

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from scipy.linalg import eigh, eigvalsh
 from sector_cases import ROWS, as_matrices
 
@@ -221,7 +222,7 @@ def test_a_damping_ratio_is_that_of_every_mode() -> None:
     )
 
 
-@pytest.mark.parametrize(
+@each(
     ("change", "words"),
     [
         ({"sectors": None}, "`sectors` is missing"),

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from lumped_structure import lumped
 
 import solver
@@ -49,7 +50,7 @@ def scene(given: dict[str, np.ndarray], couplings: list[dict[str, Any]], **more:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("seed", range(12))
+@each("seed", range(12))
 def test_random_matrices_are_the_complex_matrix(seed: int) -> None:
     rng = np.random.default_rng(seed)
     given = random_model(rng, int(rng.integers(2, 8)))
@@ -160,7 +161,7 @@ def test_each_sector_of_a_disk_has_its_own() -> None:
 EYE = [[1.0, 0.0], [0.0, 1.0]]
 
 
-@pytest.mark.parametrize(
+@each(
     ("row", "said"),
     [
         ({"K": [[1.0, 0.5], [0.0, 1.0]]}, r"`K` of a viscoelastic part must be symmetric"),

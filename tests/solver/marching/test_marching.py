@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 
 from solver.errors import SettingError
 from solver.marching import march as marching
@@ -242,7 +243,7 @@ def test_endless_changes_are_reported(monkeypatch: pytest.MonkeyPatch):
     assert result.to_json()["error_estimate"] is None
 
 
-@pytest.mark.parametrize(
+@each(
     ("arguments", "says"),
     [
         ({"frequency_hz": 0.0}, "`frequency_hz` must be a frequency > 0 Hz"),

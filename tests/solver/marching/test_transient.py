@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from scipy.integrate import solve_ivp
 from scipy.special import wofz
 
@@ -214,7 +215,7 @@ def test_a_disk_is_run_through_as_its_annulus() -> None:
     assert found.max_abs == pytest.approx(solver.march(scene, frequency_hz=at).max_abs, rel=1e-7)
 
 
-@pytest.mark.parametrize(
+@each(
     ("given", "key"),
     [
         ({}, "rate_hz_per_s"),

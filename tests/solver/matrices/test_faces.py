@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from scipy.io import mmwrite
 from scipy.sparse import coo_array
 from scipy.spatial import Voronoi
@@ -184,7 +185,7 @@ def test_contacts_and_forces_of_the_command_stand_in_the_scene(model: Path) -> N
     assert scene.observe.dof == "c"
 
 
-@pytest.mark.parametrize(
+@each(
     ("arguments", "words"),
     [
         (("--patch", "face=TOP:FOOT,kt=1,kn=1,mu=0.3"), "needs normal=x, -y or such as 0/1/0"),

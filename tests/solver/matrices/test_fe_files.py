@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from each import each
 from fe_file_set import NODES, A, files
 from fe_files import abaqus_input, ansys_mapping, dmig, hbmat, op4_binary, op4_text
 
@@ -59,13 +60,13 @@ BY_HAND = {
 }
 
 
-@pytest.mark.parametrize("name", BY_HAND)
+@each("name", BY_HAND)
 def test_layouts_by_hand(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text(BY_HAND[name])
     assert np.array_equal(read_matrix(tmp_path / name, "K").toarray(), [[3.0, -1.5], [-1.5, 2.5]])
 
 
-@pytest.mark.parametrize("name", files())
+@each("name", files())
 def test_every_layout_gives_the_matrix(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_bytes(files()[name])
     found = read_matrix(tmp_path / name, "K").toarray()
@@ -118,7 +119,7 @@ DAMAGED = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", DAMAGED)
+@each("name", DAMAGED)
 def test_a_damaged_file_names_its_line(name: str, tmp_path: Path) -> None:
     text, message = DAMAGED[name]
     (tmp_path / name).write_bytes(text.encode("latin-1"))

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-import pytest
+from each import each
 from matrix_cases import hb_text
 from scipy.io import hb_read, hb_write
 from scipy.sparse import csc_array, random_array
@@ -31,12 +31,12 @@ def random_matrix(seed: int, exponents: float) -> csc_array:
     return stored
 
 
-@pytest.mark.parametrize("seed", range(60))
+@each("seed", range(60))
 def test_what_scipy_writes_is_read(seed: int, tmp_path: Path) -> None:
     """Above 1e99 and below 1e-99 numbers touch, which SciPy itself cannot read back."""
     A = random_matrix(seed, 90.0 if seed % 3 else 290.0)
     if A.nnz == 0:
-        pytest.skip("SciPy writes no empty matrix")
+        return  # SciPy writes no empty matrix
     hb_write(tmp_path / "a.hb", A)
     found = read_harwell_boeing(tmp_path / "a.hb")
     assert np.array_equal(found.toarray(), A.toarray())
@@ -50,9 +50,9 @@ def test_whole_numbers_of_scipy_are_read(tmp_path: Path) -> None:
     assert np.array_equal(read_harwell_boeing(tmp_path / "a.hb").toarray(), A.toarray())
 
 
-@pytest.mark.parametrize("kind", ["RSA", "RUA"])
-@pytest.mark.parametrize("written", WIDTHS)
-@pytest.mark.parametrize("letter", ["E", "D", ""])
+@each("kind", ["RSA", "RUA"])
+@each("written", WIDTHS)
+@each("letter", ["E", "D", ""])
 def test_any_width_under_any_header(kind: str, written: str, letter: str, tmp_path: Path) -> None:
     """Columns narrower, as wide or wider than the header says; exponents with E, with D, without a letter."""
     rng = np.random.default_rng(7)
@@ -66,7 +66,7 @@ def test_any_width_under_any_header(kind: str, written: str, letter: str, tmp_pa
     assert np.allclose(found, A, rtol=1e-14, atol=0.0)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@each("seed", range(20))
 def test_a_character_lost_is_noticed_or_does_no_harm(seed: int, tmp_path: Path) -> None:
     """A blank that is missing moves columns: the values stay, or the file is refused."""
     A = random_matrix(1000 + seed, 30.0).toarray() + 1.0

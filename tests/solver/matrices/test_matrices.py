@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from matrix_cases import beam, beam_scene, chain_raw, hb_text, inline, write_scene
 from scipy import sparse
 from scipy.io import mmread, mmwrite, savemat
@@ -57,7 +58,7 @@ def writers() -> dict[str, Callable[[Path], object]]:
     }
 
 
-@pytest.mark.parametrize("name", writers())
+@each("name", writers())
 def test_every_format_gives_the_matrix(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
     writers()[name](path)
@@ -108,7 +109,7 @@ DAMAGED = {
 }
 
 
-@pytest.mark.parametrize("case", DAMAGED)
+@each("case", DAMAGED)
 def test_a_damaged_harwell_boeing_file_names_its_line(case: str, tmp_path: Path) -> None:
     text, message = DAMAGED[case]
     path = tmp_path / "k.rsa"
@@ -208,7 +209,7 @@ def wrong() -> dict[str, tuple[dict[str, Any], str, str]]:
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", wrong())
+@each("case", wrong())
 def test_each_mistake_names_key_and_value(case: str) -> None:
     change, pointer, message = wrong()[case]
     raw = inline(*beam(2), {"tip": 2, "mid": 0})
@@ -287,8 +288,8 @@ def test_modes_answer_as_their_matrices_do(tmp_path: Path) -> None:
         read_modes(tmp_path / "bad.npz")
 
 
-@pytest.mark.parametrize("symmetry", ["general", "symmetric", "skew-symmetric", "hermitian"])
-@pytest.mark.parametrize("dense", [True, False])
+@each("symmetry", ["general", "symmetric", "skew-symmetric", "hermitian"])
+@each("dense", [True, False])
 def test_matrix_market_is_read_as_scipy_reads_it(symmetry: str, dense: bool, tmp_path: Path) -> None:
     matrix = np.random.default_rng(1).standard_normal((5, 5)) * (
         1.0 if symmetry != "hermitian" else 1.0 + 0.5j
@@ -304,7 +305,7 @@ def test_matrix_market_is_read_as_scipy_reads_it(symmetry: str, dense: bool, tmp
     assert np.array_equal(found, expected if dense else expected.toarray())
 
 
-@pytest.mark.parametrize(
+@each(
     ("text", "message"),
     [
         ("", "line 1 must be '%%MatrixMarket matrix"),

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from scipy.io import mmwrite
 from scipy.sparse import coo_array
 
@@ -75,8 +76,8 @@ def turned(nodes: dict[int, Any], turn: np.ndarray) -> dict[int, Any]:
     return {node: tuple(map(float, turn @ np.array(at))) for node, at in nodes.items()}
 
 
-@pytest.mark.parametrize("elements", [True, False])
-@pytest.mark.parametrize("seed", range(6))
+@each("elements", [True, False])
+@each("seed", range(6))
 def test_an_even_pressure_and_linear_motions_pass(seed: int, *, elements: bool) -> None:
     """Quadrangles of any size, or the triangles between nodes, in any direction."""
     rng = np.random.default_rng(seed)

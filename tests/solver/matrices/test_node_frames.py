@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from deck_frames import abaqus, ansys, nastran, turned
+from each import each
 from fe_files import coordinate, dmig
 from scipy.linalg import eigh
 from scipy.sparse import coo_array, csr_array
@@ -183,7 +184,7 @@ def test_the_import_turns_rows_says_so_and_gives_a_damping(
     assert "damping_ratio = 0.001" in (tmp_path / "o.toml").read_text()
 
 
-@pytest.mark.parametrize(
+@each(
     ("text", "said"),
     [
         ("GRID,1,,1.,0.,0.,9\n", "no coordinate system 9"),

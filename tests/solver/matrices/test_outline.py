@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from scipy.linalg import eigh
 from sector_files import DOFS, SECTORS, TABLES, scene_of, sector_files
 
@@ -203,7 +204,7 @@ BAD: dict[str, tuple[Any, str]] = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
+@each("case", BAD)
 def test_what_is_wrong_with_an_outline_is_said(case: str) -> None:
     given, words = BAD[case]
     raw: dict[str, Any] = solver.load_scene("fe-disk").to_dict()

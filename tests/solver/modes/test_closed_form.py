@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 
 import solver
 from tests.cases.mode_cases import one_mass, slider
@@ -20,7 +21,7 @@ def test_one_slider_has_the_published_numbers(amplitude: float, frequency: float
     assert found.damping_ratio[0] == pytest.approx(zeta, abs=5e-7)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@each("seed", range(12))
 def test_one_slider_with_one_harmonic_is_the_formula(seed: int) -> None:
     rng = np.random.default_rng(seed)
     m, k = 10.0 ** rng.uniform(-3, 3), 10.0 ** rng.uniform(-2, 6)
@@ -67,7 +68,7 @@ def test_a_mode_without_contacts_is_the_linear_one() -> None:
     np.testing.assert_allclose(found.damping_ratio, 0.4 / (2.0 * math.sqrt(100.0)), rtol=1e-10)
 
 
-@pytest.mark.parametrize(
+@each(
     ("keys", "name"),
     [
         ({"mode": 0}, "mode"), ({"mode": 2}, "mode"), ({"mode": True}, "mode"), ({"mode": 1.5}, "mode"),

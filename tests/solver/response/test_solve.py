@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from scene_cases import (
     DISK_ROWS,
     TWO_DOF_ROWS,
@@ -224,7 +225,7 @@ def test_an_estimate_without_contacts_is_rounding():
     assert 0.0 < truncation_error(workspace, np.zeros(0), 1.0).max_abs < 1e-13
 
 
-@pytest.mark.parametrize(
+@each(
     ("arguments", "name"),
     [
         ({"frequency_hz": 0.0}, "frequency_hz"),

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from each import each
 from moving_scenes import moving_scene
 from scene_cases import bladed_disk, duffing, two_dof
 
@@ -43,7 +44,7 @@ def test_given_loads_need_no_multipliers():
     assert "loads are given" in solution.stability.ground
 
 
-@pytest.mark.parametrize("seed", range(12))
+@each("seed", range(12))
 def test_random_answers_stay_or_leave_as_they_say(seed: int):
     """A march begins a little beside the answer: it stays near if the answer is stable, and leaves if not."""
     scene, frequency_hz = moving_scene(seed)
@@ -63,9 +64,9 @@ def test_peaks_of_a_sweep_and_a_search_agree():
     assert told["stable"] == branch.peak_stability[0].stable.value
     assert "stable at the peak" in str(branch.summary())
     found = solve_all(duffing(), frequency_hz=0.2664, harmonics=7, starts=4)
-    for each in found.solutions:
-        assert each.solution.stable is (Stable.YES if each.sign > 0 else Stable.NO)
-        assert each.to_json()["stable"] == each.solution.stable.value
+    for one in found.solutions:
+        assert one.solution.stable is (Stable.YES if one.sign > 0 else Stable.NO)
+        assert one.to_json()["stable"] == one.solution.stable.value
 
 
 def test_a_large_scene_says_what_its_multipliers_would_cost():

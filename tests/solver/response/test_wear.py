@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from law_scene_cases import CUBIC, GAP, PLANE, RUB, scene
 from random_scenes import random_scene
 from scene_cases import bladed_disk, mixed_disk, two_dof
@@ -78,7 +79,7 @@ def wear_at(here: Scene, frequency: float, contact: str, paths: tuple[str, ...] 
     return contact_wear(solution, paths)[contact]
 
 
-@pytest.mark.parametrize("name", CASES)
+@each("name", CASES)
 def test_work_is_the_power_of_the_contact_times_the_period(name: str) -> None:
     here, frequency, contact, _ = CASES[name]
     solution = solve(here, frequency_hz=frequency)
@@ -218,8 +219,8 @@ def test_the_many_contacts_of_an_annulus_rub_alike() -> None:
     one = wear_at(bladed_disk(), 755.0, "shroud", ("shroud.kt",))
     shrouds = [w for name, w in wear.items() if name.startswith("shroud")]
     assert len(shrouds) == 8
-    for each in shrouds:
-        assert each.work.value == pytest.approx(one.work.value, rel=1e-8)
+    for other in shrouds:
+        assert other.work.value == pytest.approx(one.work.value, rel=1e-8)
     # The path moves all sectors' contacts together.
     np.testing.assert_allclose(shrouds[3].work.gradient, one.work.gradient, rtol=1e-6)
 

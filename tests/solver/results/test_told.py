@@ -11,7 +11,6 @@ from enum import Enum
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
-import pytest
 from each import each
 from every_module import every_module
 
@@ -107,7 +106,7 @@ def test_the_schema_has_types_and_words() -> None:
     assert "more" not in found["required"]
 
 
-@pytest.mark.parametrize(
+@each(
     ("value", "wanted"),
     [
         (np.array([[1.0, 2.0]]), [[1.0, 2.0]]), (np.array([1, 2]), [1, 2]), (np.array([True]), [True]),
@@ -131,7 +130,7 @@ def _results() -> Iterator[type[Told]]:
                 yield found
 
 
-@each(set(_results()))
+@each("kind", _results)
 def test_what_is_named_is_there(kind: type[Told]) -> None:
     """A key that is no attribute is one that `to_json` of the class gives; words are of fields."""
     assert "Annotated[" not in str(inspect.get_annotations(kind))

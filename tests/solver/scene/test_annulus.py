@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from each import each
 from scipy.linalg import eigvalsh
 
 from solver.errors import SettingError
@@ -36,8 +37,8 @@ def sector_response(scene: Scene, omega: float, k: int) -> np.ndarray:
     return np.linalg.solve(K - (k * omega) ** 2 * model.M + 1j * k * omega * C, force)
 
 
-@pytest.mark.parametrize("k", [0, 1, 2])
-@pytest.mark.parametrize("order", [0, 1, 3, 11])
+@each("k", [0, 1, 2])
+@each("order", [0, 1, 3, 11])
 def test_linear_response_is_that_of_one_sector(k: int, order: int):
     scene = disk(order=order)
     omega = 2 * np.pi * 560.0

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cases.body_scenes import block_in_space, planar_wedge, sector_with_damper
+from each import each
 from scipy.spatial.transform import Rotation
 
 from solver import Scene, SceneError, SettingError
@@ -33,7 +34,7 @@ def _unit() -> tuple[float, float, float]:
     return (float(x), float(y), float(z))
 
 
-@pytest.mark.parametrize("seed", range(10))
+@each("seed", range(10))
 def test_points_move_as_in_a_small_finite_rotation(seed: int) -> None:
     rng = np.random.default_rng(seed)
     given = Scene.from_dict(block_in_space())
@@ -83,7 +84,7 @@ def test_rows_of_the_wedge_are_those_derived_by_hand() -> None:
     )
 
 
-@pytest.mark.parametrize("seed", range(20))
+@each("seed", range(20))
 def test_frames_are_orthonormal(seed: int) -> None:
     rng = np.random.default_rng(seed)
     n = rng.normal(size=3)
@@ -230,7 +231,7 @@ MISTAKES: dict[str, tuple[Change, str, str]] = {
 }
 
 
-@pytest.mark.parametrize("mistake", MISTAKES)
+@each("mistake", MISTAKES)
 def test_mistakes_in_space_are_named(mistake: str) -> None:
     raw = copy.deepcopy(planar_wedge())
     change, pointer, words = MISTAKES[mistake]

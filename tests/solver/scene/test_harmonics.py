@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from referee import lost_power, motion_error
 from scene_cases import two_dof
 
@@ -62,7 +63,7 @@ def random_forces(seed: int) -> Scene:
     )
 
 
-@pytest.mark.parametrize("seed", range(20))
+@each("seed", range(20))
 def test_forces_and_loads_are_always_kept(seed: int):
     scene = random_forces(seed)
     forced = set(forced_harmonics(scene))

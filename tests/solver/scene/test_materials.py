@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cases.stress_scenes import STEEL, TERMS, stressed
+from each import each
 
 import solver
 from solver.balance.kernels.haigh import utilisation
@@ -33,7 +34,7 @@ def test_utilisation_by_hand(line: str, mean: float, expected: float) -> None:
     assert found == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@each("seed", range(40))
 def test_derivatives_of_utilisation_are_differences(seed: int) -> None:
     random = np.random.default_rng(seed)
     strength = 10.0 ** random.uniform(-3, 9)
@@ -69,7 +70,7 @@ def test_a_scene_keeps_its_materials() -> None:
     assert "materials" not in Scene.from_dict(plain).to_dict()
 
 
-@pytest.mark.parametrize(
+@each(
     ("material", "row", "message"),
     [
         ({"fatigue_strength": -1.0}, {}, "fatigue_strength"),

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from each import each
 
 from solver.errors import SceneError, SettingError
 from solver.scene.scene import Contact, Mass, Scene, load_scene, parse_end, shipped_scenes
@@ -159,7 +160,7 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("place", "value", "pointer", "says"), WRONG)
+@each(("place", "value", "pointer", "says"), WRONG)
 def test_each_mistake_is_named(place: str, value: object, pointer: str, says: str):
     found = issues(put(lumped(), place, value))
     assert pointer in found
@@ -377,7 +378,7 @@ def test_unknown_paths(path: Any, says: str):
             scene.check_path(path)
 
 
-@pytest.mark.parametrize(
+@each(
     ("path", "value", "says"),
     [
         ("damper.N0", -1.0, r"`damper.N0` must be a number >= 0 .*got -1.0"),

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from each import each
 from jsonschema import Draft202012Validator
 
 import solver
@@ -96,7 +97,7 @@ MISTAKES: dict[str, Change] = {
 }
 
 
-@pytest.mark.parametrize("mistake", MISTAKES)
+@each("mistake", MISTAKES)
 def test_what_people_get_wrong_does_not_pass(mistake: str) -> None:
     raw = copy.deepcopy(load_raw("bladed-disk"))
     raw["contacts"][0].pop("N1_ratio", None)  # type: ignore[index]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from each import each
 
 import solver
 from solver.balance.balance import build
@@ -30,8 +31,8 @@ def measured(scene: solver.Scene, at_hz: float, quantity: Quantity) -> np.ndarra
     return np.array(values[quantity])
 
 
-@pytest.mark.parametrize("quantity", Quantity)
-@pytest.mark.parametrize(("name", "at_hz"), POINTS)
+@each("quantity", Quantity)
+@each(("name", "at_hz"), POINTS)
 def test_derivatives_against_differences_of_solve(name: str, at_hz: float, quantity: Quantity) -> None:
     scene, paths = solver.load_scene(name), PATHS[name]
     found = ObservedSensitivities(build(scene, harmonics=7, effects=ALL), paths)

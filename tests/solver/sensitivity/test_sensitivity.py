@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from contact_cases import central_difference
+from each import each
 from law_scene_cases import CUBIC, GAP, PLANE, RUB
 from law_scene_cases import scene as two_directions
 from matrix_cases import beam_scene
@@ -66,7 +67,7 @@ def solved(case: str) -> tuple[Balance, np.ndarray, float]:
     return balance, found.u, hz
 
 
-@pytest.mark.parametrize("case", CASES)
+@each("case", CASES)
 def test_all_parameters_at_once_equal_one_at_a_time(case: str) -> None:
     balance, u, hz = solved(case)
     paths = CASES[case][2]

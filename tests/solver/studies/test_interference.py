@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from scipy.linalg import eigvals
 from sector_cases import as_matrices
 
@@ -142,7 +143,7 @@ def test_it_can_be_stopped() -> None:
     assert [point.diameter for point in stopped.points] == [0, 1]
 
 
-@pytest.mark.parametrize(
+@each(
     ("name", "options", "words"),
     [
         ("two-dof", {}, "`scene` must be a disk"),

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from mistuned_cases import VALUES, disk, with_mistuning
 from scene_cases import bladed_disk, two_dof
 
@@ -33,7 +34,7 @@ from solver.response.contact_response import ContactState
 from solver.scene.cyclic.annulus import written_out
 
 
-@pytest.mark.parametrize("order", [0, 1, 3, 4, 5, 7, 8, 11])
+@each("order", [0, 1, 3, 4, 5, 7, 8, 11])
 def test_without_spread_it_is_one_sector(order: int):
     """Also for orders beyond half the number of sectors, which run backward, and beyond the number itself."""
     raw = bladed_disk().to_dict()
@@ -359,7 +360,7 @@ def test_what_differs_from_sector_to_sector_is_not_continued_in(scene: Scene, pa
         sweep(scene, path, 0.1, 0.2, frequency_hz=3.4)
 
 
-@pytest.mark.parametrize(
+@each(
     ("table", "pointer", "says"),
     [
         ({"of": ["root"]}, "", "needs `spread` .* or `values`, got neither"),

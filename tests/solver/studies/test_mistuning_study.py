@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from scene_cases import bladed_disk, two_dof
 
 from solver import (
@@ -117,7 +118,7 @@ def test_a_disk_at_rest_is_nothing_to_compare_with() -> None:
     assert found.disks == found.branches == ()
 
 
-@pytest.mark.parametrize(
+@each(
     ("change", "name"),
     [({"samples": 0}, "samples"), ({"samples": True}, "samples"), ({"spread": -0.1}, "spread"),
      ({"spread": math.nan}, "spread"), ({"spread": 2.0}, "spread"), ({"dof": "hub"}, "dof"),

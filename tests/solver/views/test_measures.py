@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import pytest
+from each import each
 
 import optim
 import solver
@@ -37,8 +37,8 @@ def two_dof(observed: dict[str, Any]) -> Scene:
     return Scene.from_dict(raw)
 
 
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("study", STUDIES)
+@each("name", NAMES)
+@each("study", STUDIES)
 def test_axes_json_and_tables_name_what_is_measured(name: str, study: str) -> None:
     observed, words = NAMES[name]
     found = STUDIES[study](two_dof(observed))

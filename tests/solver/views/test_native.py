@@ -119,7 +119,7 @@ def public_dataclasses() -> list[type]:
     return [one for one in named if isinstance(one, type) and dataclasses.is_dataclass(one)]
 
 
-@each(public_dataclasses())
+@each("kind", public_dataclasses)
 def test_every_public_result_says_what_it_is(kind: type) -> None:
     assert issubclass(kind, Told) != (kind.__name__ in NOT_LOOKED_AT)
     if issubclass(kind, Told):
@@ -127,7 +127,7 @@ def test_every_public_result_says_what_it_is(kind: type) -> None:
         assert issubclass(kind, Shown | Piece)
 
 
-@each(public_dataclasses())
+@each("kind", public_dataclasses)
 def test_every_result_with_a_status_says_in_one_word_whether_it_answers(kind: type) -> None:
     status = next((one for one in dataclasses.fields(kind) if one.name == "status"), None)
     if issubclass(kind, Shown) and status is not None:

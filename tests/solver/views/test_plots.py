@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from each import each
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.colors import to_rgb
@@ -165,7 +166,7 @@ def test_a_file_is_whole_or_not_there(tmp_path: Path) -> None:
     assert path.read_text() == "all"
 
 
-@pytest.mark.parametrize(
+@each(
     ("metres", "shown"),
     [
         (13.4758, "13.48 m"), (0.61031, "0.6103 m"), (0.0923, "92.3 mm"), (1.00331e-4, "0.1003 mm"),
@@ -176,7 +177,7 @@ def test_lengths_have_the_unit_that_fits(metres: float, shown: str) -> None:
     assert units.length(metres) == shown
 
 
-@pytest.mark.parametrize(
+@each(
     ("path", "shown"),
     [("frequency", "1.5 Hz"), ("shroud.N0", "1.5 N"), ("shroud.N1_ratio", "1.5"), ("structure.k1", "1.5"),
      ("shroud.kt", "1.5 N/m"), ("shroud.N1_phase", "1.5 rad"),

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 
 from service.cli import main
 from stickslip.lab.proofs import checker
@@ -55,7 +56,7 @@ def refused(raw: Any) -> str:
     return told
 
 
-@pytest.mark.parametrize("name", [p.stem for p in sorted(PROOFS.glob("*.json")) if p.stat().st_size < 4000])
+@each("name", [p.stem for p in sorted(PROOFS.glob("*.json")) if p.stat().st_size < 4000])
 def test_the_judge_finds_honest_certificates_true(name: str) -> None:
     """But for two whose motion changes too fast for its steps."""
     if name not in ("goodman-klumpp-bar", "stiff-10000"):
@@ -134,7 +135,7 @@ def _set(raw: Any, path: str, value: Any) -> Any:
     return raw
 
 
-@pytest.mark.parametrize(
+@each(
     ("name", "path", "value", "told"),
     [
         ("one-stop", "orbit.states", [], "orbit.states is a list of 0, it must be a list of 1"),
@@ -189,9 +190,9 @@ def test_text_that_is_no_certificate_is_refused(tmp_path: Path, capsys: pytest.C
         text.replace('"bits": 128', '"bits": 128, "bits": 128'), text.replace('"slip-"', '"slip\\ud800"'),
         '{"certificate": ' * 400 + "1" + "}" * 400, json.dumps({"certificates": [{"certificate": None}]}),
     ]  # fmt: skip
-    for each in texts:
+    for text in texts:
         with pytest.raises(checker.RejectedError):
-            checker.check(checker.read(each))
+            checker.check(checker.read(text))
         file.write_text(each, encoding="utf-8")
         assert main(["check-proof", str(file)]) == 2
         assert "must be a certificate" in capsys.readouterr().err

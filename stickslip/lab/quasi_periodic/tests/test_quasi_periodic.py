@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from scipy.integrate import solve_ivp
 
 import solver
@@ -175,8 +176,8 @@ def test_two_engine_orders_of_a_disk_are_those_of_the_whole_annulus() -> None:
     )  # fmt: skip
     assert found.turns == ((3, 5),)
     whole = annulus(scene).to_dict()
-    for each in whole["excitation"]:
-        each["harmonic"] = 3
+    for force in whole["excitation"]:
+        force["harmonic"] = 3
     for contact in whole["contacts"]:
         if ratio := contact.pop("N1_ratio", None):
             wave = {"order": 3, "amplitude": ratio * contact["N0"], "phase": contact.pop("N1_phase", 0.0)}
@@ -230,7 +231,7 @@ def test_a_curve_says_what_is_not_known_and_stops_when_asked() -> None:
         assert refused.value.name == next(iter(given))
 
 
-@pytest.mark.parametrize(
+@each(
     ("given", "key"),
     [
         ({"second_hz": 1.0}, "second_hz"),

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize_scalar
 
@@ -268,7 +269,7 @@ def test_an_open_contact_wears_no_more_and_a_given_load_that_is_gone_ends_it() -
     assert found.loads[0, -1] == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize(
+@each(
     ("changes", "field"),
     [
         ({"hours": 0.0}, "hours"), ({"coefficient": {"no": 1e-12}}, "coefficient.no"),

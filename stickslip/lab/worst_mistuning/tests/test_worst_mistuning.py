@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from mistuned_cases import disk as friction_disk
 from scene_cases import bladed_disk, two_dof
 
@@ -108,7 +109,7 @@ def draw(rng: np.random.Generator) -> tuple[Scene, float]:
     return scene, float(10.0 ** rng.uniform(-3.0, -0.4))
 
 
-@pytest.mark.parametrize("seed", range(20))
+@each("seed", range(20))
 def test_amplitudes_are_those_of_full_matrices_and_slopes_those_of_differences(seed: int) -> None:
     rng = np.random.default_rng(seed)
     scene, within = draw(rng)
@@ -133,7 +134,7 @@ def test_amplitudes_are_those_of_full_matrices_and_slopes_those_of_differences(s
     assert twice == pytest.approx((ahead_of[2] - behind_of[2]) / (2.0 * h), rel=1e-4)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@each("seed", range(8))
 def test_the_peak_of_a_pattern_is_that_of_a_grid_and_its_slope_that_of_the_peak(seed: int) -> None:
     rng = np.random.default_rng(100 + seed)
     scene, within = draw(rng)
@@ -419,7 +420,7 @@ def test_a_disk_at_rest_is_nothing_to_compare_with() -> None:
         assert found.worst is None
 
 
-@pytest.mark.parametrize(
+@each(
     ("change", "name"),
     [
         ({"within": 0.0}, "within"), ({"within": math.nan}, "within"), ({"within": 1.0}, "within"),

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from each import each
 from law_scene_cases import CUBIC, RUB
 from law_scene_cases import scene as of_laws
 from scene_cases import two_dof
@@ -71,10 +72,8 @@ def test_its_peak_is_tracked_as_peaks_are(case: Any, low: float, high: float) ->
         assert max(beside) < peak * (1.0 + 1e-6)
 
 
-@pytest.mark.parametrize(
-    ("scene", "hertz"), [(two_dof(N1_ratio=0.7), 1.05), (of_laws(RUB), 0.3), (of_laws(CUBIC), 0.3)]
-)
-@pytest.mark.parametrize("harmonic", [1, 2, 3, 13])
+@each(("scene", "hertz"), [(two_dof(N1_ratio=0.7), 1.05), (of_laws(RUB), 0.3), (of_laws(CUBIC), 0.3)])
+@each("harmonic", [1, 2, 3, 13])
 def test_it_is_that_harmonic_of_the_whole_motion(scene: Scene, hertz: float, harmonic: int) -> None:
     whole = solver.solve(measured(scene, harmonic), frequency_hz=hertz)
     for effects in (Effects(), Effects.everything()):
