@@ -47,6 +47,16 @@ def made_up(folder: Path, text: str, seconds: float = 20.0) -> tuple[list[dict[s
     return scorer.told(place)["RUNGS"], asking.Code(place, seconds)
 
 
+def scored(folder: Path, body: str, seconds: float = 20.0) -> dict[str, Any]:
+    """Return the score of a forged adapter on one case."""
+    rungs, process = made_up(folder, FORGED.format(body=body), seconds)
+    try:
+        [score] = scorer.one(process, "one-slider", rungs, seconds)
+    finally:
+        process.close()
+    return score
+
+
 FORGED = """
 import json, os, sys, time
 from pathlib import Path
@@ -95,21 +105,12 @@ READY = """
 @pytest.mark.skipif(not fence.offered(), reason="the system has no Landlock")
 def test_an_adapter_finds_no_answers(tmp_path: Path) -> None:
     """Neither beside itself nor in the repository, though its own packages are there."""
-    body = READS.format(repository=str(HERE / "cases"))
-    rungs, process = made_up(tmp_path, FORGED.format(body=body))
-    try:
-        [score] = scorer.one(process, "one-slider", rungs, 20.0)
-    finally:
-        process.close()
+    score = scored(tmp_path, READS.format(repository=str(HERE / "cases")))
     assert score == {"rung": {}, "failed": "ArithmeticError: there are none"}
 
 
 def test_time_and_estimate_are_not_what_an_adapter_says(tmp_path: Path) -> None:
-    rungs, process = made_up(tmp_path, FORGED.format(body=HIDES))
-    try:
-        [score] = scorer.one(process, "one-slider", rungs, 20.0)
-    finally:
-        process.close()
+    score = scored(tmp_path, HIDES)
     assert score["digits"] == scorer.MOST
     assert 0.45 < score["seconds"] < 2.0  # what a process that was left behind spends is counted
     assert not score["covered"]
@@ -132,20 +133,11 @@ def test_time_and_estimate_are_not_what_an_adapter_says(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_no_answer_scores_nothing(tmp_path: Path, body: str, failed: str) -> None:
-    rungs, process = made_up(tmp_path, FORGED.format(body=body), 0.5)
-    try:
-        [score] = scorer.one(process, "one-slider", rungs, 0.5)
-    finally:
-        process.close()
-    assert score == {"rung": {}, "failed": failed}
+    assert scored(tmp_path, body, 0.5) == {"rung": {}, "failed": failed}
 
 
 def test_an_answer_that_is_remembered_is_wrong_the_next_time(tmp_path: Path) -> None:
-    rungs, process = made_up(tmp_path, FORGED.format(body=REMEMBERS))
-    try:
-        [score] = scorer.one(process, "one-slider", rungs, 20.0)
-    finally:
-        process.close()
+    score = scored(tmp_path, REMEMBERS)
     assert score["digits"] <= 0.4
 
 

@@ -37,19 +37,21 @@ def client(port: int) -> Iterator[Client]:
         yield client
 
 
-Start = Callable[[object], "subprocess.Popen[bytes]"]
+Start = Callable[..., "subprocess.Popen[bytes]"]
 
 
 @pytest.fixture
-def start(tmp_path: Path) -> Iterator[Start]:
-    """Starts services on one database; what they log is shown if the test fails."""
+def start(tmp_path: Path, port: int) -> Iterator[Start]:
+    """Starts services on one database, or who works for none; what they log is shown if the test fails."""
     started: list[subprocess.Popen[bytes]] = []
     log = tmp_path / "log"
 
-    def begin(what: object) -> subprocess.Popen[bytes]:
+    def begin(what: object = port) -> subprocess.Popen[bytes]:
         with log.open("ab") as stderr:
             command = [sys.executable, str(SCRIPT), f"sqlite:///{tmp_path}/jobs.db", str(what), "1"]
             started.append(subprocess.Popen(command, stderr=stderr))
+        if what == port:
+            until(lambda: answers(port))
         return started[-1]
 
     yield begin
@@ -69,11 +71,10 @@ def alive(pid: int) -> bool:
 
 @pytest.mark.long
 def test_a_service_killed_loses_nothing_and_leaves_no_worker(
-    tmp_path: Path, port: int, client: Client, start: Start
+    tmp_path: Path, client: Client, start: Start
 ) -> None:
     file = tmp_path / "pids"
-    process = start(port)
-    until(lambda: answers(port))
+    process = start()
     specs = [{"kind": "iteration", "seconds": 0.5, "seed": n, "pid_file": str(file)} for n in range(4)]
     jobs = [client.submit(spec).id for spec in specs]
     until(lambda: pids(file))
@@ -81,8 +82,7 @@ def test_a_service_killed_loses_nothing_and_leaves_no_worker(
     process.wait()
     until(lambda: not any(alive(pid) for pid in pids(file)))
 
-    process = start(port)
-    until(lambda: answers(port))
+    process = start()
     done = [client.wait(job, timeout=PATIENCE) for job in jobs]
     assert [job.status for job in done] == [JobState.SUCCESSFUL] * 4
     assert max(job.attempt for job in done) == 2
@@ -93,19 +93,17 @@ def test_a_service_killed_loses_nothing_and_leaves_no_worker(
 
 @pytest.mark.long
 def test_a_service_that_is_stopped_ends_what_does_not_heed_and_goes_on_with_it_later(
-    tmp_path: Path, port: int, client: Client, start: Start
+    tmp_path: Path, client: Client, start: Start
 ) -> None:
     file = tmp_path / "pids"
-    process = start(port)
-    until(lambda: answers(port))
+    process = start()
     running = client.submit({"kind": "deaf", "seconds": 600.0, "pid_file": str(file)}).id
     until(lambda: pids(file))
     process.terminate()
     assert process.wait(PATIENCE) == 0, "it does not wait for what takes 600 s"
     assert not any(alive(pid) for pid in pids(file))
 
-    process = start(port)
-    until(lambda: answers(port))
+    process = start()
     until(lambda: client.job(running).status is JobState.RUNNING)
     assert client.job(running).attempt == 1, "an orderly stop costs no attempt"
     assert client.dismiss(running).status is JobState.DISMISSED
@@ -115,12 +113,11 @@ def test_a_service_that_is_stopped_ends_what_does_not_heed_and_goes_on_with_it_l
 
 @pytest.mark.long
 def test_workers_that_get_the_same_sigterm_as_their_service_cost_no_attempt(
-    tmp_path: Path, port: int, client: Client, start: Start
+    tmp_path: Path, client: Client, start: Start
 ) -> None:
     """As when an init system ends everything in a service's control group at once."""
     file = tmp_path / "pids"
-    process = start(port)
-    until(lambda: answers(port))
+    process = start()
     job = client.submit({"kind": "iteration", "seconds": 1.0, "pid_file": str(file)}).id
     until(lambda: pids(file))
     for pid in (*pids(file), process.pid):
@@ -146,7 +143,6 @@ def test_workers_that_get_the_same_sigterm_as_their_service_cost_no_attempt(
 )
 def test_a_long_sweep_goes_on_after_every_way_to_end_a_service(
     ends: tuple[signal.Signals, ...],
-    port: int,
     client: Client,
     start: Start,
     monkeypatch: pytest.MonkeyPatch,
@@ -154,8 +150,7 @@ def test_a_long_sweep_goes_on_after_every_way_to_end_a_service(
     monkeypatch.setenv("STICKSLIP_CHECKPOINT_SECONDS", "0.05")
     disk = solver.annulus(solver.load_scene("bladed-disk")).to_dict()
     body = {"scene": disk, "from": 650, "to": 750, "harmonics": 13}
-    process = start(port)
-    until(lambda: answers(port))
+    process = start()
     job = client.submit({**body, "kind": "slow-sweep"}).id
     for number in ends:
         known = client.job(job).progress
@@ -163,8 +158,7 @@ def test_a_long_sweep_goes_on_after_every_way_to_end_a_service(
         reached = client.job(job).progress
         process.send_signal(number)
         process.wait(PATIENCE)
-        process = start(port)
-        until(lambda: answers(port))
+        process = start()
         assert client.job(job).progress > 0.5 * reached, "what was computed is not lost"
     done = client.wait(job, timeout=PATIENCE)
     assert (done.status, done.attempt) == (JobState.SUCCESSFUL, 2), "a kill costs an attempt"
@@ -186,8 +180,7 @@ def test_a_stop_waits_for_nobody(
     """Open streams and waiting requests are sent home, clients that do nothing are left behind."""
     for name, seconds in {"SHUTDOWN": 3, "HEADER": 600, "BODY": 600, "MAX_WAIT": 600}.items():
         monkeypatch.setenv(f"STICKSLIP_{name}_SECONDS", str(seconds))
-    process = start(port)
-    until(lambda: answers(port))
+    process = start()
     job = client.submit({"kind": "iteration", "seconds": 600.0}).id
     until(lambda: client.job(job).status is JobState.RUNNING)
     address = f"http://127.0.0.1:{port}"
@@ -252,8 +245,7 @@ def test_what_the_end_of_a_service_interrupts_is_answered_503_and_can_be_repeate
                 httpx.post(f"http://127.0.0.1:{port}/v1/jobs", json=body, headers=headers, timeout=PATIENCE)
             )
 
-    process = start(port)
-    until(lambda: answers(port))
+    process = start()
     thread = threading.Thread(target=submit)
     thread.start()
     time.sleep(0.1)
@@ -264,8 +256,7 @@ def test_what_the_end_of_a_service_interrupts_is_answered_503_and_can_be_repeate
     if found and not written:
         assert is_problem(found[0], 503)["type"].endswith("stopping")
         assert int(found[0].headers["retry-after"]) >= 1
-    start(port)
-    until(lambda: answers(port))
+    start()
     submit()
     assert found[-1].status_code == (200 if written else 202)
     client.wait(found[-1].json()["id"])

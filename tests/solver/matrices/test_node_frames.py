@@ -161,19 +161,22 @@ def test_rows_of_calculix_stay_and_a_note_says_so(tmp_path: Path) -> None:
     assert "CalculiX stores" in same.remarks[0]
 
 
+def nastran_ring(folder: Path) -> tuple[Array, Array, Array, list[str]]:
+    """M, K, and K as NASTRAN writes it, along a cylinder's axes; the import of its files."""
+    M, K, places = ring()
+    Ml, Kl, _, _ = held(cylinder(places), [], M, K)
+    numbers = [(i // 3 + 1, i % 3 + 1) for i in range(27)]
+    (folder / "m.pch").write_text(dmig("MAAX", Ml, numbers) + dmig("KAAX", Kl, numbers))
+    deck = nastran_cylinder(folder / "m.bdf", places)
+    return M, K, Kl, ["import", f"{folder}/m.pch", "--out", f"{folder}/o.toml", "--nodes", str(deck)]
+
+
 def test_the_import_turns_rows_says_so_and_gives_a_damping(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    M, K, places = ring()
-    axes = cylinder(places)
-    Ml, Kl, _, _ = held(axes, [], M, K)
-    numbers = [(i // 3 + 1, i % 3 + 1) for i in range(27)]
-    (tmp_path / "m.pch").write_text(dmig("MAAX", Ml, numbers) + dmig("KAAX", Kl, numbers))
-    deck = nastran_cylinder(tmp_path / "m.bdf", places)
-    args = ["import", str(tmp_path / "m.pch"), "--out", str(tmp_path / "o.toml"), "--sectors", "6",
-            "--low", "1,2,3", "--high", "7,8,9", "--nodes", str(deck), "--dof", "tip=5.UX",
-            "--reduce", "--modes", "8"]  # fmt: skip
-    assert main([*args, "--json"]) == 0
+    M, K, _, args = nastran_ring(tmp_path)
+    args += ["--sectors", "6", "--low", "1,2,3", "--high", "7,8,9", "--dof", "tip=5.UX"]
+    assert main([*args, "--reduce", "--modes", "8", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     R = turned(np.array([0.0, 0.0, 1.0]), 2 * math.pi / SECTORS)
     truth = frequencies(M, K, [(0, 6, R), (1, 7, R), (2, 8, R)], 2)
@@ -283,15 +286,8 @@ def test_rows_without_mass_on_both_boundaries_are_refused(
 def test_a_structure_that_refers_to_files_is_turned_whenever_it_is_loaded(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    M, K, places = ring()
-    axes = cylinder(places)
-    Ml, Kl, _, _ = held(axes, [], M, K)
-    numbers = [(i // 3 + 1, i % 3 + 1) for i in range(27)]
-    (tmp_path / "m.pch").write_text(dmig("MAAX", Ml, numbers) + dmig("KAAX", Kl, numbers))
-    deck = nastran_cylinder(tmp_path / "m.bdf", places)
-    args = ["import", str(tmp_path / "m.pch"), "--out", str(tmp_path / "o.toml"), "--nodes", str(deck),
-            "--dof", "x=8.UX", "--dof", "y=8.UY"]  # fmt: skip
-    assert main(args) == 0
+    _, K, Kl, args = nastran_ring(tmp_path)
+    assert main([*args, "--dof", "x=8.UX", "--dof", "y=8.UY"]) == 0
     capsys.readouterr()
     structure = solver.load_scene(tmp_path / "o.toml").structure
     assert isinstance(structure, MatricesStructure)
