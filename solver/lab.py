@@ -24,11 +24,24 @@ class MissingRoomError(SolverError):
         super().__init__(f"this needs {LAB}.{room}, which is not installed")
 
 
+_FOLDER = os.path.join(os.path.dirname(os.path.dirname(__file__)), *LAB.split("."))
+
+
 @cache
 def rooms() -> frozenset[str]:
     """The folders of the lab that are there; nothing is imported to know it."""
-    lab = os.path.join(os.path.dirname(os.path.dirname(__file__)), *LAB.split("."))
-    return frozenset(name for name in os.listdir(lab) if name.isidentifier() and name[0] != "_")
+    return frozenset(name for name in os.listdir(_FOLDER) if name.isidentifier() and name[0] != "_")
+
+
+def files_of(name: str) -> dict[str, bytes]:
+    """What the file of a name holds, of every folder of the lab that has it."""
+    paths = {room: os.path.join(_FOLDER, room, name) for room in sorted(rooms())}
+    found = {}
+    for room, path in paths.items():
+        if os.path.isfile(path):
+            with open(path, "rb") as file:
+                found[room] = file.read()
+    return found
 
 
 def is_there(module: str) -> bool:

@@ -26,6 +26,7 @@ from service.errors import NotFoundError
 from service.http.dependencies import TEXT, InContext, media
 from service.http.made_once import Constant
 from service.http.middleware.admission import LOGIN
+from solver.lab import files_of
 
 router = APIRouter(include_in_schema=False)
 
@@ -48,7 +49,10 @@ _SHEET = re.compile(r'<link rel="stylesheet" href="/page/%VERSION%/css/([\w-]+\.
 
 @cache
 def files() -> dict[str, bytes]:
-    """Every file of the page by its path, and its modules and style sheets as one each; read once."""
+    """Every file of the page by its path, and its modules and style sheets as one each; read once.
+
+    A folder of the lab has its view in `view.js`: they are modules of `js/lab/`, `js/lab.js` lists them.
+    """
     found: dict[str, bytes] = {}
     pending: list[tuple[str, Traversable]] = [("", resources.files("service") / "page")]
     while pending:
@@ -57,6 +61,10 @@ def files() -> dict[str, bytes]:
             pending.extend((f"{path}/{child.name}".lstrip("/"), child) for child in item.iterdir())
         elif path[path.rfind(".") :] in _TYPES:
             found[path] = item.read_bytes()
+    views = files_of("view.js")
+    found |= {f"js/lab/{room}.js": view for room, view in views.items()}
+    imports = "".join(f'import {{ view as {room} }} from "./lab/{room}.js";\n' for room in views)
+    found["js/lab.js"] = f"{imports}export const LAB = [{', '.join(views)}];\n".encode()
     texts = {path: data.decode() for path, data in found.items() if path.endswith(".js")}
     found[_SCRIPT] = bundle(texts, _ENTRY).encode()
     sheets = _SHEET.findall(found["index.html"].decode())

@@ -1,42 +1,30 @@
 // The page of stickslip: projects, scenes and runs at the left, one scene with its answer and views beside them.
 
 import { asOneStep, lastWritten, read, state, write } from "./base/address.js";
-import { Problem, patiently, post, watchStart } from "./network/api.js";
-import { byId, dropsOn, el, show } from "./base/dom.js";
-import { startInterference } from "./disk/interference.js";
-import { startAnswer } from "./views/answer.js";
-import { startDesign } from "./views/design.js";
-import { edit, editCurrent, newScene } from "./editor/editor.js";
+import { button, byId, dropsOn, el, onFiles, options, show } from "./base/dom.js";
 import { on, tell } from "./base/events.js";
-import { startFront } from "./views/front.js";
-import { loadKinds } from "./scene/kinds.js";
-import { loadLaws } from "./scene/laws.js";
+import { saveToml } from "./base/exports.js";
+import { finishLogin, startNotices } from "./base/notices.js";
+import { edit, editCurrent, newScene } from "./editor/editor.js";
+import { Problem, patiently, post, watchStart } from "./network/api.js";
 import { forget, resume, run } from "./network/jobs.js";
-import { finishLogin, startLogin } from "./network/login.js";
-import { showResponse, startLive, wishFirst } from "./views/live.js";
-import { startIdentify } from "./identify/view.js";
-import { startModes } from "./modes/view.js";
-import { startMap } from "./views/map.js";
+import { loadKinds, loadLaws } from "./scene/kinds.js";
+import { filesOf, openScene, sceneIn } from "./scene/files.js";
 import { openMatrices } from "./scene/matrices.js";
-import { filesOf, openScene, sceneIn } from "./scene/scene_files.js";
-import { startNotices } from "./base/notices.js";
-import { showOther, startOthers } from "./views/others.js";
-import { startPoint } from "./views/point.js";
-import { startRenewal } from "./views/renewal.js";
-import { startResponse, sweepView } from "./views/response.js";
 import { asked, current, listScenes, loadScene, variedParts } from "./scene/scenes.js";
-import { startShape } from "./shape/card.js";
 import { fillSettings, startSettings } from "./scene/settings.js";
 import { contactTable, drawStructure } from "./scene/structure.js";
-import { startSensitivities } from "./views/sensitivities.js";
-import { startStudies } from "./views/studies.js";
+import { startShape } from "./shape/card.js";
+import { hasOwnView, STUDIES, viewOf, VIEWS } from "./views.js";
+import { startAnswer } from "./views/answer.js";
+import { showResponse, startLive, wishFirst } from "./views/live.js";
+import { showOther, startOthers } from "./views/others.js";
+import { startRenewal } from "./views/renewal.js";
+import { response } from "./views/response.js";
 import { startStudy } from "./views/study.js";
-import { startTheme } from "./base/theme.js";
-import { saveToml } from "./base/toml.js";
-import { VIEWS } from "./views.js";
-import { startPanel } from "./design/panel.js";
+import { placeCards, startViews } from "./views/view.js";
 import { startComparison } from "./workbench/comparison.js";
-import { startFrame } from "./workbench/frame.js";
+import { startFrame, startTheme } from "./workbench/frame.js";
 import { listProjects, startProjects } from "./workbench/projects.js";
 import { listRuns, startRunList } from "./workbench/run_list.js";
 import { startRuns } from "./workbench/runs.js";
@@ -50,7 +38,7 @@ let sceneNames = [];
 
 async function scenes() {
   const known = await listScenes();
-  show(byId("scene"), known.map(({ name, shipped }) => el("option", { value: name }, shipped ? name : `${name} (stored)`)));
+  show(byId("scene"), options(known.map((each) => [each.name, titleOf(each)])));
   if (!known.some(({ name }) => name === state.scene)) {
     const wanted = state.scene;
     state.scene = known.some(({ name }) => name === FIRST) ? FIRST : known[0].name;
@@ -61,6 +49,8 @@ async function scenes() {
   sceneList();
 }
 
+const titleOf = ({ name, shipped }) => (shipped ? name : `${name} (stored)`);
+
 // What a link wanted of a scene that is not there is not for the one shown instead.
 function missing(wanted) {
   tell("notice", `There is no scene ${wanted} at this service: ${state.scene} is shown instead.`);
@@ -68,8 +58,7 @@ function missing(wanted) {
 }
 
 function sceneList() {
-  show(byId("scene-list"), sceneNames.map(({ name, shipped }) => el("li", {},
-    el("button", { type: "button", "aria-current": name === state.scene ? "true" : undefined, onclick: () => choose(name) }, shipped ? name : `${name} (stored)`))));
+  show(byId("scene-list"), sceneNames.map((each) => el("li", {}, button(titleOf(each), () => choose(each.name), { "aria-current": each.name === state.scene ? "true" : undefined }))));
 }
 
 async function choose(name) {
@@ -88,7 +77,7 @@ async function open() {
   states = { states: null, at: null };
   drawScene();
   tell("scene");
-  for (const [kind, view] of Object.entries(VIEWS)) if (view) resume(kind, view);
+  for (const view of STUDIES) resume(view.kind, view);
 }
 
 let drawn = "";
@@ -102,7 +91,7 @@ function drawScene() {
 }
 
 const forgetAll = () => {
-  for (const kind of new Set([...Object.keys(VIEWS), ...Object.keys(state.jobs)])) forget(kind);
+  for (const kind of new Set([...VIEWS.flatMap(({ kind }) => kind ?? []), ...Object.keys(state.jobs)])) forget(kind);
 };
 
 const change = (name) => asOneStep(async () => {
@@ -169,29 +158,25 @@ async function openedRun({ id, kind, request }) {
   tell("values");
   tell("settled");
   tell("tab", tabOf(kind));
-  if (VIEWS[kind]) await resume(kind, VIEWS[kind]);
-  else if (!(kind in VIEWS)) await showOther(kind);
+  if (!hasOwnView(kind)) await showOther(kind);
+  else if (viewOf(kind).title) await resume(kind, viewOf(kind));
 }
 
 // The frequency response alone, where it is too large to be followed live.
 async function sweepAlone() {
   byId("response").scrollIntoView({ block: "nearest" });
-  await run("sweep", asked(), { ...sweepView, result: (result, ...more) => { sweepView.result(result, ...more); showResponse(result); } }, 6);
+  await run("sweep", asked(), { ...response, result: (result, ...more) => { response.result(result, ...more); showResponse(result); } }, response.priority);
 }
 
 function controls() {
+  const clicks = {
+    "open-file": () => byId("file").click(), "open-matrices": () => openMatrices(), "new-scene": () => newScene().catch(failed),
+    "edit-scene": () => editCurrent().catch(failed), "save-toml": () => saveToml(`${state.scene}.toml`), share,
+  };
+  for (const [id, act] of Object.entries(clicks)) byId(id).addEventListener("click", act);
   byId("scene").addEventListener("change", () => change(byId("scene").value));
-  byId("open-file").addEventListener("click", () => byId("file").click());
-  byId("file").addEventListener("change", async () => {
-    await take([...byId("file").files]);
-    byId("file").value = "";
-  });
-  byId("open-matrices").addEventListener("click", () => openMatrices());
+  onFiles(byId("file"), take);
   dropsOn(document.body, (given) => filesOf(given).then(take).catch(failed));
-  byId("new-scene").addEventListener("click", () => newScene().catch(failed));
-  byId("edit-scene").addEventListener("click", () => editCurrent().catch(failed));
-  byId("save-toml").addEventListener("click", () => saveToml(`${state.scene}.toml`));
-  byId("share").addEventListener("click", share);
   addEventListener("popstate", () => asOneStep(restore, { back: true }).catch(failed));
 }
 
@@ -236,34 +221,13 @@ async function start() {
   startTheme();
   startNotices();
   watchStart();
-  startLogin();
   await finishLogin();
   read();
-  startTabs();
-  startProjects();
-  startRunList();
-  startRuns();
-  startRunsTable();
-  startComparison();
-  startDesign();
-  startSensitivities();
-  startLive();
-  startResponse();
-  startMap();
-  startPoint();
+  placeCards(VIEWS);
+  for (const begins of [startTabs, startProjects, startRunList, startRuns, startRunsTable, startComparison, startLive]) begins();
+  startViews(VIEWS);
   startShape((at) => ({ ...asked(), frequency_hz: at }));
-  startFront();
-  startStudies();
-  startModes();
-  startIdentify();
-  startInterference();
-  startOthers();
-  startSettings();
-  startRenewal();
-  startAnswer();
-  startStudy();
-  startPanel();
-  startFrame();
+  for (const begins of [startOthers, startSettings, startRenewal, startAnswer, startStudy, startFrame]) begins();
   controls();
   on("states", (found) => {
     states = found;

@@ -1,24 +1,28 @@
-// The kinds of job with a view of their own: a further one is its module and a line here. The card "Other
-// studies" has a form and a view for every other kind the service knows.
+// The views of the page in the order of their cards: a further one is its file and a line here. Those of the lab stand
+// in its folders (`view.js`). The card “Other studies” has a form and a view for every other kind the service knows.
 
-import { interferenceView } from "./disk/interference.js";
-import { designView } from "./views/design.js";
-import { frontView } from "./views/front.js";
-import { identifyView } from "./identify/view.js";
-import { mapView } from "./views/map.js";
-import { modesView } from "./modes/view.js";
-import { sweepView } from "./views/response.js";
-import { accuracyView, campbellView } from "./views/studies.js";
+import { identify } from "./identify/view.js";
+import { LAB } from "./lab.js";
+import { modes } from "./modes/view.js";
+import { campbell } from "./views/campbell.js";
+import { design } from "./views/design.js";
+import { front } from "./views/front.js";
+import { interference } from "./views/interference.js";
+import { map } from "./views/map.js";
+import { margin } from "./views/margin.js";
+import { point, timeMarch } from "./views/point.js";
+import { problem } from "./views/problem.js";
+import { response } from "./views/response.js";
 
-export const VIEWS = {
-  sweep: sweepView,
-  design: designView,
-  map: mapView,
-  pareto: frontView,
-  accuracy: accuracyView,
-  campbell: campbellView,
-  modes: modesView,
-  identify: identifyView,
-  interference: interferenceView,
-  march: null, // Follows the point that is looked at, which begins it.
-};
+export const VIEWS = [response, problem, design, map, front, margin, ...LAB, campbell, interference, point, timeMarch, modes, identify];
+
+// The tabs that cards stand under; all of them stand under the last.
+export const TABS = [["response", "Response"], ["map", "Map"], ["design", "Design"], ["disk", "Disk"], ["modes", "Modes"], ["identify", "Identification"], ["accuracy", "Accuracy"], ["runs", "Runs"], ["all", "All"]];
+
+// Those that show a kind of job in a card of their own.
+export const STUDIES = VIEWS.filter(({ kind, title }) => kind && title);
+
+export const viewOf = (kind) => VIEWS.find((view) => view.kind === kind);
+
+// Whether a kind is shown elsewhere than among the other studies.
+export const hasOwnView = (kind) => Boolean(viewOf(kind) && !viewOf(kind).drawings);

@@ -1,7 +1,8 @@
 // Taking things away: files of charts, numbers and answers.
 
-import { blobOf, Problem } from "../network/api.js";
-import { tell } from "./events.js";
+import { fetched, orNotice, Problem } from "../network/api.js";
+import { current, variable } from "../scene/scenes.js";
+import { state } from "./address.js";
 
 const PAINT = ["fill", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "stroke-linecap", "opacity",
   "font-size", "font-family", "font-weight", "paint-order"];
@@ -20,12 +21,22 @@ export function saveBlob(blob, name) {
 export const saveText = (text, name, type) => saveBlob(new Blob([text], { type }), name);
 
 // A file of the service; a refusal is said, not thrown.
-export async function saveFrom(path, accept, name, options) {
-  try {
-    saveBlob(await blobOf(path, accept, options), name);
-  } catch (error) {
-    tell("notice", error instanceof Problem ? `${name}: ${error.message}` : error.message);
+export const saveFrom = (path, accept, name, options = {}) => orNotice(async () => {
+  const answer = await fetched(path, { ...options, headers: { Accept: accept } });
+  saveBlob(await answer.blob(), name);
+}, (error) => (error instanceof Problem ? `${name}: ${error.message}` : error.message));
+
+// The scene as set, in TOML, with the commands that reproduce what is seen.
+export function saveToml(name) {
+  const harmonics = `--harmonics ${state.harmonics}`;
+  const [low, high] = current.body.observe.band;
+  const commands = [`stickslip sweep ${name} --from ${low} --to ${high} ${harmonics}`];
+  if (state.contact && state.range) {
+    const [from, to] = state.range;
+    commands.push(`stickslip design ${name} --variable ${variable()} ${from} ${to} ${harmonics}`, `stickslip map ${name} --parameter ${variable()} --from ${from} --to ${to} ${harmonics}`);
   }
+  const comments = ["As set on the page of stickslip. The same from the command:", ...commands];
+  return saveFrom("/v1/scenes/text", "application/toml", name, { method: "POST", body: { scene: state.scene, set: state.set, comments } });
 }
 
 // The drawing with its computed paint as attributes: it looks the same outside the page. The copy stands in a document

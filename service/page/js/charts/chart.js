@@ -1,10 +1,9 @@
 // A chart of lines and points in SVG: read by mouse and keyboard, picked by click and Enter, saved as files.
 
-import { el, show, svg } from "../base/dom.js";
+import { button, el, show, svg } from "../base/dom.js";
 import { csvText, pngBlob, saveBlob, saveText, svgText } from "../base/exports.js";
 import { number } from "../base/format.js";
-import { pathOf, plane, shape } from "./plane.js";
-import { extent } from "./scales.js";
+import { extent, pathOf, placeIn, plane, shape, sized } from "./plane.js";
 import { dragged, joined, rule, zoomButtons, zoomKey, zoomed } from "./zoom.js";
 
 const MARGIN_LEFT = 62;
@@ -18,8 +17,7 @@ const DASHES = { dashed: "7 4", dotted: "2 4" };
 // Charts of a tab with the same abscissa share the crosshair and the stretch that is zoomed.
 export function chart(host, { label, file, height = 300, onPick, legend = true, pickSeries = 0 }) {
   const read = el("p", { class: "chart-read", "aria-live": "polite" });
-  const drawing = svg("svg", { class: "chart", role: "group", tabindex: 0, "aria-label": label });
-  drawing.setAttribute("aria-roledescription", onPick ? "chart, arrows move along it, Enter picks" : "chart, arrows move along it");
+  const drawing = svg("svg", { class: "chart", role: "group", tabindex: 0, "aria-label": label, "aria-roledescription": `chart, arrows move along it${onPick ? ", Enter picks" : ""}` });
   const tools = el("div", { class: "chart-tools" });
   const foot = el("div", { class: "chart-foot" }, read, tools);
   show(host, drawing, foot);
@@ -100,7 +98,7 @@ function paint(self, host, height, legend, label) {
   const base = plane(width, height, x, y, { above: ROW * names.rows });
   Object.assign(self, base);
   const clip = `clip-${label.replace(/\W+/g, "-")}`;
-  const { box, xs, ys } = base;
+  const { box, xs } = base;
   const within = svg(
     "g",
     { "clip-path": `url(#${clip})` },
@@ -111,14 +109,16 @@ function paint(self, host, height, legend, label) {
     series.map((line) => curve(line, base)),
   );
   self.mark = svg("g", {});
-  drawingOf(self.drawing, width, height, [
+  sized(self.drawing, width, height);
+  show(
+    self.drawing,
     svg("defs", {}, svg("clipPath", { id: clip }, svg("rect", { x: box.left, y: box.top - 6, width: box.right - box.left, height: box.bottom - box.top + 12 }))),
     base.frame,
     within,
     marks.map((mark) => marked(mark, base)),
     key(names),
     self.mark,
-  ]);
+  );
 }
 
 // The values of a line over a stretch, with its neighbours: what the frame of a zoomed chart holds.
@@ -131,13 +131,6 @@ function nearest(line, x) {
     if (value !== null && line.y[i] !== null && Math.abs(value - x) < Math.abs((line.x[best] ?? Infinity) - x)) best = i;
   });
   return best;
-}
-
-function drawingOf(drawing, width, height, nodes) {
-  drawing.setAttribute("viewBox", `0 0 ${width} ${height}`);
-  drawing.setAttribute("width", width);
-  drawing.setAttribute("height", height);
-  show(drawing, ...nodes);
 }
 
 function bars(line, { box, xs, ys }) {
@@ -233,9 +226,7 @@ function key({ entries }) {
 function hover(self, event, which) {
   const line = self.shown?.series[which];
   if (!line?.x.length) return;
-  const frame = self.drawing.getBoundingClientRect();
-  const zoom = frame.width / self.drawing.viewBox.baseVal.width || 1;
-  const [px, py] = [(event.clientX - frame.left) / zoom, (event.clientY - frame.top) / zoom];
+  const [px, py] = placeIn(self.drawing, event);
   let [best, least] = [0, Infinity];
   line.x.forEach((value, i) => {
     if (value === null || line.y[i] === null) return;
@@ -293,12 +284,11 @@ function keyed(self, event, onPick, which) {
 
 // The buttons that take a chart away.
 export function saving(self, file, label, canvas) {
-  const button = (text, act) =>
-    el("button", { type: "button", "aria-label": `${label}: save as ${text}`, onclick: () => self.shown && act() }, text);
+  const as = (text, act) => button(text, () => self.shown && act(), { "aria-label": `${label}: save as ${text}` });
   return [
-    button("SVG", () => saveText(svgText(self.drawing, canvas?.()), `${file}.svg`, "image/svg+xml")),
-    button("PNG", async () => saveBlob(await pngBlob(self.drawing, canvas?.()), `${file}.png`)),
-    button("CSV", () => saveText(csvText(self.columns?.() ?? columnsOf(self.shown)), `${file}.csv`, "text/csv")),
+    as("SVG", () => saveText(svgText(self.drawing, canvas?.()), `${file}.svg`, "image/svg+xml")),
+    as("PNG", async () => saveBlob(await pngBlob(self.drawing, canvas?.()), `${file}.png`)),
+    as("CSV", () => saveText(csvText(self.columns?.() ?? columnsOf(self.shown)), `${file}.csv`, "text/csv")),
   ];
 }
 

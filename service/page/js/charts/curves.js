@@ -1,6 +1,6 @@
 // A response as a chart: its curve through its polished peak, stable and not, its band.
 
-import { length, lengthUnit, number } from "../base/format.js";
+import { largest, length, lengthUnit, number, times } from "../base/format.js";
 
 // The amplitudes of the points that are stable, and of those that are not with their neighbours; null elsewhere.
 function byStability({ amplitude, unstable }) {
@@ -34,7 +34,7 @@ export function throughPeak({ parameter, amplitude, peak, unstable }) {
 // A response as a chart: curve, peak, band. `more` are further curves.
 export function responseOf(answer, more = []) {
   const scale = lengthUnit(answer.peak?.value ?? 1);
-  const up = (values) => values.map((v) => (v === null ? null : v * scale.perMetre));
+  const up = (values) => values.map(times(scale.perMetre));
   const points = throughPeak(answer);
   const parts = byStability(points);
   const name = answer.measured?.name ?? "amplitude";
@@ -52,3 +52,15 @@ export function responseOf(answer, more = []) {
   };
 }
 
+const COLOURS = 6;
+export const seriesColour = (i) => 1 + (i % COLOURS);
+
+export const known = (rows) => rows.flat().filter((value) => value !== null);
+
+// An amplitude in the length that suits it, a stress in MPa, anything else as it is.
+export function scaled(rows, unit) {
+  if (unit === "Pa") return { name: "MPa", factor: 1e-6 };
+  if (unit !== "m") return { name: unit, factor: 1 };
+  const scale = lengthUnit(largest(known(rows)));
+  return { name: scale.name, factor: scale.perMetre, unit: scale };
+}

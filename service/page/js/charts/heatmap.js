@@ -1,26 +1,40 @@
 // The map of amplitude over two parameters: a canvas below, axes and lines in SVG above.
 
-import { chartTools } from "./heatmap_tools.js";
-import { SHADES } from "../base/colours.js";
 import { el, show, svg } from "../base/dom.js";
 import { lengthUnit, number } from "../base/format.js";
-import { mapButtons, mapDragged, mapKey } from "./map_zoom.js";
 import { bisector } from "../vendor/d3.js";
-import { pathOf, plane, shape } from "./plane.js";
-import { joined } from "./zoom.js";
+import { saving } from "./chart.js";
+import { pathOf, placeIn, plane, shape, sized } from "./plane.js";
+import { joined, mapButtons, mapDragged, mapKey } from "./zoom.js";
 
 const LEGEND = 14;
+// Viridis, which everybody can read, in 16 stops between which colours are mixed.
+const STOPS = [
+  [68, 1, 84], [72, 26, 108], [71, 47, 125], [65, 68, 135], [57, 86, 140], [49, 104, 142], [42, 120, 142], [35, 136, 142],
+  [31, 152, 139], [34, 168, 132], [53, 183, 121], [84, 197, 104], [122, 209, 81], [165, 219, 54], [210, 226, 27], [253, 231, 37],
+];
+
+const SHADES = (() => {
+  const table = new Uint8ClampedArray(256 * 4);
+  for (let i = 0; i < 256; i += 1) {
+    const place = (i / 255) * (STOPS.length - 1);
+    const at = Math.min(Math.floor(place), STOPS.length - 2);
+    for (let c = 0; c < 3; c += 1) table[4 * i + c] = STOPS[at][c] + (place - at) * (STOPS[at + 1][c] - STOPS[at][c]);
+    table[4 * i + 3] = 255;
+  }
+  return table;
+})();
 
 // Draws {x, y: {name, values, log}, rows: [[metre]], lines: [{name, x, y, colour, dash}], marks: [{x, y, text}]}.
 export function heatmap(host, { label, file, height = 340, onPick }) {
   const read = el("p", { class: "chart-read", "aria-live": "polite" });
   const canvas = el("canvas", { "aria-hidden": "true" });
-  const drawing = svg("svg", { class: "chart", role: "group", tabindex: 0, "aria-label": label });
-  drawing.setAttribute("aria-roledescription", "map, arrows move in it, with Shift they move the map, Enter picks");
+  const drawing = svg("svg", { class: "chart", role: "group", tabindex: 0, "aria-label": label, "aria-roledescription": "map, arrows move in it, with Shift they move the map, Enter picks" });
   const stage = el("div", { class: "canvas-host" }, canvas, drawing);
   const self = { drawing, canvas, shown: null, row: null, column: null, window: null, windowY: null, log: {} };
   const at = () => (self.column === null ? null : pointOf(self));
-  const tools = chartTools(self, file, label, mapButtons(self, label, at));
+  const tools = el("div", { class: "chart-tools" }, mapButtons(self, label, at), saving(self, file, label, () => canvas));
+  self.columns = () => columns(self.shown);
   show(host, stage, el("div", { class: "chart-foot" }, read, tools));
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   self.repaint = () => {
@@ -49,11 +63,8 @@ export function heatmap(host, { label, file, height = 340, onPick }) {
   joined(self);
   const place = (event) => {
     if (!self.shown) return false;
-    const frame = drawing.getBoundingClientRect();
-    const zoom = frame.width / drawing.viewBox.baseVal.width || 1;
-    const x = self.xs.back((event.clientX - frame.left) / zoom);
-    const y = self.ys.back((event.clientY - frame.top) / zoom);
-    cursor(self, nearest(self.shown.x.values, x), nearest(self.shown.y.values, y), read);
+    const [x, y] = placeIn(drawing, event);
+    cursor(self, nearest(self.shown.x.values, self.xs.back(x)), nearest(self.shown.y.values, self.ys.back(y)), read);
     return true;
   };
   drawing.addEventListener("pointermove", (event) => event.buttons || place(event));
@@ -83,12 +94,6 @@ const falling = bisector((value) => -value);
 function nearest(values, wanted) {
   const up = values[values.length - 1] >= values[0];
   return up ? rising.center(values, wanted) : falling.center(values, -wanted);
-}
-
-function sized(drawing, width, height) {
-  drawing.setAttribute("viewBox", `0 0 ${width} ${height}`);
-  drawing.setAttribute("width", width);
-  drawing.setAttribute("height", height);
 }
 
 // An axis as it is looked at: its whole, the stretch that is zoomed, logarithmic where it is asked for and may be.
@@ -200,4 +205,10 @@ export function shadeStrip([low, high]) {
   strip.style.height = `${LEGEND}px`;
   const text = (value) => `${number(value * unit.perMetre, 3)} ${unit.name}`;
   return el("div", { class: "strip-row" }, el("span", {}, text(low)), strip, el("span", {}, `${text(high)} (logarithmic)`));
+}
+
+// Its CSV is a table of every cell.
+function columns({ x, y, rows }) {
+  const cells = y.values.flatMap((b, j) => x.values.map((a, i) => [a, b, rows[j][i]]));
+  return [x.name, y.name, "amplitude [m]"].map((name, k) => [name, cells.map((cell) => cell[k])]);
 }

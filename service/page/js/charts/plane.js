@@ -1,8 +1,8 @@
-// The frame of a chart: paper, grid, axes with their names, and the box inside.
+// The frame of a chart: axes from values to pixels, on the scales of D3, paper, grid, names, and the box inside.
 
 import { svg } from "../base/dom.js";
-import { line } from "../vendor/d3.js";
-import { scale } from "./scales.js";
+import { number } from "../base/format.js";
+import { line, scaleLinear, scaleLog } from "../vendor/d3.js";
 
 const MARGIN = { left: 62, right: 14, top: 12, bottom: 44 };
 const PIXELS_A_TICK = { x: 72, y: 42 };
@@ -83,4 +83,62 @@ export function shape(kind, x, y, r, colour, title) {
   if (kind === "cross") node.setAttribute("stroke-width", 2);
   if (title) node.append(svg("title", {}, title));
   return node;
+}
+
+// A drawing has a size; a press or a move of the pointer is at a place in it.
+export function sized(drawing, width, height) {
+  for (const [name, value] of Object.entries({ viewBox: `0 0 ${width} ${height}`, width, height })) drawing.setAttribute(name, value);
+}
+
+export function placeIn(drawing, { clientX, clientY }) {
+  const { left, top, width } = drawing.getBoundingClientRect();
+  const zoom = width / drawing.viewBox.baseVal.width || 1;
+  return [(clientX - left) / zoom, (clientY - top) / zoom];
+}
+
+const LEAST = 1e-300; // what a logarithmic axis draws nothing and less at
+
+function scale(log, low, high, from, to) {
+  const of = (log ? scaleLog() : scaleLinear()).domain([low, high > low ? high : low + 1]).range([from, to]);
+  return {
+    low,
+    high,
+    log: Boolean(log),
+    at: log ? (value) => of(Math.max(value, LEAST)) : of,
+    back: of.invert,
+    ticks: (count) => (log ? logTicks(of, count) : of.ticks(count).map(tick)),
+  };
+}
+
+// Lines at the digits of each decade, with numbers at those there is room for; less than a decade has round numbers.
+function logTicks(of, count) {
+  const [low, high] = of.domain();
+  if (high / low < 5) return scaleLinear().domain([low, high]).ticks(count).map(tick);
+  const named = of.tickFormat(count, (value) => tick(value).text);
+  return of.ticks().map((value) => ({ value, text: named(value) }));
+}
+
+const tick = (value) => {
+  const size = Math.abs(value);
+  if (size < 1e-14) return { value, text: "0" };
+  return { value, text: size < 1e-3 ? value.toExponential().replace(/(\.\d{1,3})\d*e/, "$1e") : number(value, 6) };
+};
+
+// The ends of an axis for values; a log axis leaves out what is not positive.
+export function extent(lists, { log = false, zero = false, pad = 0.04 } = {}) {
+  let [low, high] = [Infinity, -Infinity];
+  for (const list of lists) {
+    for (const value of list) {
+      if (value === null || !Number.isFinite(value) || (log && value <= 0)) continue;
+      if (value < low) low = value;
+      if (value > high) high = value;
+    }
+  }
+  if (low > high) return log ? [0.1, 1] : [0, 1];
+  if (log) {
+    const factor = Math.max((high / low) ** pad, 1.02);
+    return [low / factor, high * factor];
+  }
+  const margin = (high - low || Math.abs(high) || 1) * pad;
+  return [zero && low >= 0 ? 0 : low - margin, high + margin];
 }

@@ -1,8 +1,8 @@
 // The editor of a scene: tables of its parts and its text side by side, what is wrong at the field and at the line.
 
-import { saveText } from "../base/exports.js";
-import { byId, el, say, show } from "../base/dom.js";
+import { button, byId, el, onSubmit, say, show } from "../base/dom.js";
 import { tell } from "../base/events.js";
+import { saveText } from "../base/exports.js";
 import { Problem, post } from "../network/api.js";
 import { current } from "../scene/scenes.js";
 import { idOf } from "./cells.js";
@@ -25,7 +25,7 @@ export async function openText(text, form) {
   } catch (error) {
     const panel = byId("editor");
     panel.hidden = false;
-    show(panel, el("p", { class: "issues", role: "alert", tabindex: -1 }, `The file cannot be read: ${error.message}`), el("button", { type: "button", onclick: close }, "Close"));
+    show(panel, el("p", { class: "issues", role: "alert", tabindex: -1 }, `The file cannot be read: ${error.message}`), button("Close", close));
     panel.firstChild.focus();
   }
   return undefined;
@@ -71,10 +71,10 @@ async function build() {
   const form = el("form", { novalidate: true, id: "editor-form" },
     el("div", { class: "editor-bar" },
       el("button", { type: "submit", class: "main-button" }, "Use this scene"),
-      el("button", { type: "button", id: "editor-undo", title: "Undo (Ctrl+Z)", onclick: () => step("undo") }, "Undo"),
-      el("button", { type: "button", id: "editor-redo", title: "Redo (Ctrl+Shift+Z)", onclick: () => step("redo") }, "Redo"),
-      el("button", { type: "button", onclick: () => saveText(doc.text, `${doc.scene.name || "scene"}.toml`, "application/toml") }, "Save as TOML"),
-      el("button", { type: "button", onclick: close }, "Close"),
+      button("Undo", () => step("undo"), { id: "editor-undo", title: "Undo (Ctrl+Z)" }),
+      button("Redo", () => step("redo"), { id: "editor-redo", title: "Redo (Ctrl+Shift+Z)" }),
+      button("Save as TOML", () => saveText(doc.text, `${doc.scene.name || "scene"}.toml`, "application/toml")),
+      button("Close", close),
       el("p", { id: "editor-status", role: "status", class: "note" })),
     el("div", { id: "editor-issues" }),
     el("div", { class: "editor-sides" },
@@ -86,10 +86,7 @@ async function build() {
     busy(true);
     doc.type(words);
   }, () => doc.scene);
-  form.addEventListener("submit", (event) => {
-    event.preventDefault();
-    store();
-  });
+  onSubmit(form, store);
   form.addEventListener("keydown", keys);
   tables.addEventListener("focusin", help);
 }

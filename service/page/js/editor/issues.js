@@ -3,7 +3,7 @@
 import { el } from "../base/dom.js";
 
 // "/structure/springs/0/k" is "structure › springs 1 › k".
-export function placeOf(pointer) {
+function placeOf(pointer) {
   const words = [];
   for (const part of pointer.split("/").slice(1)) {
     if (/^\d+$/.test(part) && words.length) words[words.length - 1] += ` ${Number(part) + 1}`;

@@ -1,7 +1,7 @@
 // What a scene may hold, by the schema of the service: its tables with their keys, units, words and choices.
 
 import { request } from "../network/api.js";
-import { parameterOf } from "../scene/laws.js";
+import { parameterOf } from "../scene/kinds.js";
 
 const FIRST = ["name", "kind", "sectors", "dof", "on", "shape", "law", "between", "between_second", "normal_between"];
 const LAST = ["at", "normal", "tangents", "motions", "direction", "out", "axial", "group", "factor"];

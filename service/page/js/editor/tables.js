@@ -1,6 +1,6 @@
 // The sections of a scene as tables: a row for each mass, spring, contact …, a column for each value.
 
-import { el, show, svg } from "../base/dom.js";
+import { button, el, note, show, svg } from "../base/dom.js";
 import { cell, idOf, nameCell, textOf } from "./cells.js";
 import { addRow, completed, dofsOf, doubleRow, endsOf, escaped, isKept, removeRow, rename, rowsOf, setCell } from "./scene_data.js";
 import { keyOf, keysOf, oneOf, requiredKeys, sectionsOf, titleOf, wordsOf } from "./schema.js";
@@ -71,7 +71,7 @@ export function drawTables(host, scene, edit) {
   const lists = [["editor-ends", endsOf(scene)], ["editor-dofs", dofsOf(scene)]].map(([id, names]) => el("datalist", { id }, names.map((name) => el("option", { value: name }))));
   const add = unused.length
     ? el("fieldset", { class: "add-section" }, el("legend", {}, "Add"), el("div", { class: "row" }, unused.map((section) =>
-      el("button", { type: "button", title: wordsOf(scene, section.path), id: `add-${idOf(`/${section.path}`)}`, onclick: () => edit((draft) => { addRow(draft, section); }, `${idOf(`/${section.path}`)}`) }, titleOf(section.path)))))
+      button(titleOf(section.path), () => edit((draft) => { addRow(draft, section); }, idOf(`/${section.path}`)), { title: wordsOf(scene, section.path), id: `add-${idOf(`/${section.path}`)}` }))))
     : null;
   show(host, lists, used.map((section) => (section.form === "fields" ? fields(scene, section, edit) : rowTable(scene, section, edit))), add);
 }
@@ -111,10 +111,9 @@ function rowTable(scene, section, edit) {
   const table = rows.length
     ? el("div", { class: "scroll" }, el("table", { class: "grid" }, el("caption", { class: "unseen" }, titleOf(path)),
       el("thead", {}, el("tr", {}, first, heads, el("th", { scope: "col" }, el("span", { class: "unseen" }, "Change the row")))), el("tbody", {}, body)))
-    : el("p", { class: "note" }, `None. ${wordsOf(scene, path)}`);
-  const last = rows.length;
+    : note(`None. ${wordsOf(scene, path)}`);
   return el("fieldset", { class: "section", id: idOf(`/${path}`) }, el("legend", {}, titleOf(path), rows.length ? el("span", { class: "count" }, ` ${rows.length}`) : null), table,
-    el("button", { type: "button", class: "add", id: `add-${idOf(`/${path}`)}`, onclick: () => edit((draft) => { addRow(draft, section); }, `row:${path}:${last}`) }, `Add ${oneOf(path)}`));
+    button(`Add ${oneOf(path)}`, () => edit((draft) => { addRow(draft, section); }, `row:${path}:${rows.length}`), { class: "add", id: `add-${idOf(`/${path}`)}` }));
 }
 
 function rowOf(scene, section, each, columns, edit) {
@@ -131,7 +130,7 @@ function rowOf(scene, section, each, columns, edit) {
     : null;
   const cells = columns.map((key) => el("td", {}, oneCell(scene, section, each, key, scalar, who, edit)));
   if (form === "names" && !columns.length) cells.push(el("td", {}, oneCell(scene, section, each, "row", true, who, edit)));
-  const act = (words, sign, change, focus) => el("button", { type: "button", class: "icon", "aria-label": `${words} ${who}`, title: words, onclick: () => edit(change, focus) }, icon(sign));
+  const act = (words, sign, change, focus) => button(icon(sign), () => edit(change, focus), { class: "icon", "aria-label": `${words} ${who}`, title: words });
   const more = path === "structure/dofs" ? null : moreKeys(scene, path, asTable(row), columns, edit, index);
   return el("tr", { "data-row": `${path}:${index}`, "data-pointer": pointer }, naming, cells, el("td", { class: "acts" }, more,
     act("Duplicate", COPY, (draft) => { doubleRow(draft, section, index); }, `row:${path}:${index + 1}`),

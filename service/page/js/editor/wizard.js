@@ -1,6 +1,6 @@
 // A scene from nothing: the cases that the service knows, with the few questions of each.
 
-import { el, show } from "../base/dom.js";
+import { button, el, note, show } from "../base/dom.js";
 import { fieldsOf } from "../forms/fields.js";
 import { schemaForm } from "../forms/form.js";
 import { Problem, post, request } from "../network/api.js";
@@ -14,12 +14,12 @@ export async function openChooser(panel, { made, close }) {
   const fill = async (template, answers) => made((await post("/v1/templates", { template, answers })).scene);
   const cards = templates.map(({ name, title, questions }) => card(title, questions.description, () => ask(panel, { name, title, questions, fill, close, back: () => openChooser(panel, { made, close }) })));
   const empty = card("An empty scene", "One mass on a spring, one contact, one force: rows to begin with in the tables.", () => fill(EMPTY, { name: "new-scene" }));
-  show(panel, el("div", { class: "editor-bar" }, el("h3", {}, "New scene"), el("button", { type: "button", onclick: close }, "Close")), el("div", { class: "cards" }, empty, cards));
+  show(panel, el("div", { class: "editor-bar" }, el("h3", {}, "New scene"), button("Close", close)), el("div", { class: "cards" }, empty, cards));
   panel.querySelector(".cards button").focus();
   panel.scrollIntoView({ block: "nearest" });
 }
 
-const card = (title, words, onclick) => el("button", { type: "button", class: "choice-card", onclick }, el("strong", {}, title), el("span", {}, words));
+const card = (title, words, onclick) => button([el("strong", {}, title), el("span", {}, words)], onclick, { class: "choice-card" });
 
 function ask(panel, { name, title, questions, fill, close, back }) {
   // A question is called by its words: its key is known to nobody yet.
@@ -28,8 +28,8 @@ function ask(panel, { name, title, questions, fill, close, back }) {
     return { ...field, label: label.trim(), words: field.words.slice(label.length).replace(/^[,;:. ]+|\s*\[[^\]]+\]|\.$/g, "") };
   });
   const host = el("form", { novalidate: true, id: "wizard-form" });
-  show(panel, el("div", { class: "editor-bar" }, el("h3", {}, title), el("button", { type: "button", onclick: back }, "Back"), el("button", { type: "button", onclick: close }, "Close")),
-    el("p", { class: "note" }, questions.description), host);
+  show(panel, el("div", { class: "editor-bar" }, el("h3", {}, title), button("Back", back), button("Close", close)),
+    note(questions.description), host);
   const form = schemaForm(host, { fields }, { id: "wizard", words: "Make the scene", primary: true, submit: async (answers) => {
     try {
       await fill(name, answers);

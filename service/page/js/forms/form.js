@@ -1,6 +1,6 @@
 // A form made of the schema of a body: a field for each key, rows for its tables, what is wrong beside it.
 
-import { byId, el, show } from "../base/dom.js";
+import { byId, el, onSubmit, show } from "../base/dom.js";
 import { on } from "../base/events.js";
 import { kindOf } from "../scene/kinds.js";
 import { tablesIn } from "./columns.js";
@@ -103,13 +103,10 @@ export function schemaForm(host, kind, { id = kind, keys = () => true, top = [],
   if (kind.fields || kindOf(kind)) build();
   // Lengths are asked for in the unit of what is seen.
   on("size", (metres) => single().forEach((part) => part.sized?.(metres)));
-  if (submit) {
-    host.addEventListener("submit", (event) => {
-      event.preventDefault();
-      const { body, wrong } = read();
-      complain(wrong);
-      if (!wrong.length) submit(body);
-    });
-  }
+  if (submit) onSubmit(host, () => {
+    const { body, wrong } = read();
+    complain(wrong);
+    if (!wrong.length) submit(body);
+  });
   return { read, fill, complain, rows: (key) => parts.get(key)?.rows };
 }

@@ -1,14 +1,13 @@
 // The parts of a form: a field, rows of a table or a list, names that something holds for. Each reads and fills its keys
 // of a body: {node, read, fill, input or rows}.
 
-import { el, show } from "../base/dom.js";
+import { el, note, options, show } from "../base/dom.js";
 import { lengthUnit, METRES } from "../base/format.js";
-import { listBody, listColumns, listRow, rowsOfTable, tableBody, tableColumns } from "./columns.js";
+import { boundsTold, listBody, listColumns, listRow, namesOfTable, rowsOfTable, tableBody, tableColumns } from "./columns.js";
 import { hintOf, readField, written } from "./fields.js";
 import { rowsOf } from "./rows.js";
-import { boundsTold, namesOfTable } from "./tables.js";
 
-const framed = ({ label, words }, ...content) => el("fieldset", {}, el("legend", { title: words }, label), el("p", { class: "note" }, words), content);
+const framed = ({ label, words }, ...content) => el("fieldset", {}, el("legend", { title: words }, label), note(words), content);
 
 const one = ({ label }) => label.replace(/s$/, "");
 
@@ -64,7 +63,7 @@ function control(field, common) {
   if (field.kind === "truth") return el("input", { ...common, type: "checkbox" });
   if (field.kind !== "choice") return el("input", { ...common, type: "text", inputmode: field.kind === "number" ? "decimal" : "text", placeholder: hintOf(field), spellcheck: false, autocomplete: "off" });
   const words = (field.otherwise === undefined ? [""] : []).concat(field.choices);
-  return el("select", common, words.map((word) => el("option", { value: word, selected: word === field.otherwise }, word || "as usual")));
+  return el("select", common, options(words.map((word) => [word, word || "as usual"]), field.otherwise));
 }
 
 // One key as a field; a length is asked for in a unit that may be chosen.
@@ -72,7 +71,7 @@ export function fieldPart(id, field) {
   const name = `${id}-${field.key}`;
   const input = control(field, { id: name, name: field.key, title: field.words, "aria-describedby": `${name}-more`, "aria-required": field.required ? "true" : undefined, "data-usual": field.otherwise });
   const isLength = field.unit === "m";
-  const unit = isLength ? el("select", { id: `${name}-unit`, "aria-label": `Unit of ${field.label}`, class: "unit" }, Object.keys(METRES).map((each) => el("option", { value: each, selected: each === "mm" }, each)))
+  const unit = isLength ? el("select", { id: `${name}-unit`, "aria-label": `Unit of ${field.label}`, class: "unit" }, options(Object.keys(METRES), "mm"))
     : field.unit ? el("span", { class: "unit" }, field.unit) : null;
   const per = () => (isLength ? 1 / METRES[unit.value] : 1);
   const sized = (metres) => { if (isLength && lengthUnit(metres).name in METRES) unit.value = lengthUnit(metres).name; };

@@ -1,12 +1,12 @@
 // A list of like things as rows of fields under one line of heads: added, removed, read, filled, blamed.
 
-import { el, show } from "../base/dom.js";
+import { button, el, options as optionsOf, show } from "../base/dom.js";
 
 // `columns`: {name, label, type: "number" | "text" | "select" | "now", options, hint, off}; `told(row)` gives what stands
 // in columns of the type "now". `read` gives a table for each row, without empty fields.
 export function rowsOf(host, { id, one, columns, least = 0, told = null }) {
   const body = el("div", { class: "rows" });
-  const add = el("button", { type: "button", id: `${id}-add`, class: "add-row", onclick: () => { const field = fresh(); refresh(field.closest(".problem-row"), "path"); field.focus(); } }, `Add ${one}`);
+  const add = button(`Add ${one}`, () => { const field = fresh(); refresh(field.closest(".problem-row"), "path"); field.focus(); }, { id: `${id}-add`, class: "add-row" });
   show(host, body, add);
   body.addEventListener("change", (event) => refresh(event.target.closest(".problem-row"), event.target.name));
 
@@ -23,11 +23,11 @@ export function rowsOf(host, { id, one, columns, least = 0, told = null }) {
   function fresh(values = {}) {
     const about = `${one} ${body.children.length + 1}`;
     const fields = columns.filter((column) => !column.off?.()).map((column) => fieldIn(column, values[column.name], about));
-    const remove = el("button", { type: "button", class: "remove icon", onclick: () => {
+    const remove = button("×", () => {
       row.remove();
       number();
       (body.lastElementChild?.querySelector("input, select") ?? add).focus();
-    } }, "×");
+    }, { class: "remove icon" });
     const row = el("div", { class: "problem-row", role: "group", "aria-label": about }, fields, remove, el("p", { class: "message", role: "alert" }));
     body.append(row);
     number();
@@ -65,7 +65,7 @@ function fieldIn({ name, label, type = "number", options, hint }, value, about) 
   if (type === "now") return el("span", { class: "problem-field" }, el("span", {}, label), el("span", { class: "now", "data-now": name }, ""));
   const common = { name, "aria-label": `${about}: ${label}` };
   const input = type === "select"
-    ? el("select", common, offered(options(), value).map((option) => el("option", { value: option, selected: option === value }, option)))
+    ? el("select", common, optionsOf(offered(options(), value), value))
     : el("input", { ...common, type: "text", inputmode: type === "number" ? "decimal" : "text", class: type === "number" ? "number" : undefined, placeholder: hint ?? "", spellcheck: false });
   if (type !== "select" && value !== undefined && value !== null) input.value = String(value);
   return el("label", { class: "problem-field" }, el("span", {}, label), input);

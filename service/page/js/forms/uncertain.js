@@ -1,9 +1,9 @@
 // What is not known: intervals and deviations as rows, or what an identification gave, held as it is.
 
-import { byId, el, show } from "../base/dom.js";
+import { button, byId, el, show } from "../base/dom.js";
+import { boundsTold, namesOfTable } from "./columns.js";
 import { numberOf, Unreadable } from "./fields.js";
 import { rowsOf } from "./rows.js";
-import { boundsTold, namesOfTable } from "./tables.js";
 
 const HOW = { "± share": "deviation", "± value": "absolute_deviation" };
 
@@ -32,7 +32,7 @@ export function uncertainPart(id) {
   function hold(found) {
     given = found;
     show(byId(`${id}-given`), given ? el("p", { class: "row" }, el("span", { class: "chip good" }, given.words), el("span", { class: "note" }, "in place of intervals"),
-      el("button", { type: "button", onclick: () => { hold(null); byId(`${id}-uncertain-add`).focus(); } }, "Take it out")) : null);
+      button("Take it out", () => { hold(null); byId(`${id}-uncertain-add`).focus(); })) : null);
   }
 
   return {

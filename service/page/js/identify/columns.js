@@ -1,6 +1,6 @@
 // Exports of rigs as they stand: raw headings, below each what it is and in which unit, the first rows, then read.
 
-import { el, show } from "../base/dom.js";
+import { button as buttonOf, el, note, onSubmit, options, scrolled, show } from "../base/dom.js";
 
 const KEPT = "stickslip-columns";
 const SEPARATORS = { ";": "semicolons", "\t": "tabs", ",": "commas", "|": "bars" };
@@ -24,11 +24,10 @@ export function askColumns(host, layouts, quantities, read) {
   const cells = layout.columns[0].cells.map((_, row) => layout.columns.map((column) => el("td", { class: "number" }, column.cells[row])));
   const command = el("code", {});
   const form = el("form", { class: "columns", "aria-label": `Columns of ${layout.name}` },
-    el("h3", {}, layout.name), el("p", { class: "note" }, `${SEPARATORS[layout.separator]} between, decimal ${layout.decimal === "," ? "commas" : "points"}, headings in line ${layout.head_line}, ${layout.rows} rows. `,
+    el("h3", {}, layout.name), note(`${SEPARATORS[layout.separator]} between, decimal ${layout.decimal === "," ? "commas" : "points"}, headings in line ${layout.head_line}, ${layout.rows} rows. `,
       before ? el("span", { class: "chip good" }, "as last time") : null),
-    el("div", { class: "scroll", role: "region", "aria-label": `First rows of ${layout.name}`, tabindex: 0 }, el("table", {}, el("thead", {}, el("tr", {}, heads)), el("tbody", {}, cells.map((row) => el("tr", {}, row))))),
-    status, el("p", { class: "note" }, "The same from the command: ", command),
-    el("div", { class: "row" }, button, el("button", { type: "button", onclick: next }, "Leave the file out")));
+    scrolled(`First rows of ${layout.name}`, el("table", {}, el("thead", {}, el("tr", {}, heads)), el("tbody", {}, cells.map((row) => el("tr", {}, row))))),
+    status, note("The same from the command: ", command), el("div", { class: "row" }, button, buttonOf("Leave the file out", next)));
 
   function head(i) {
     const { heading, quantity, unit } = chosen[i];
@@ -37,7 +36,7 @@ export function askColumns(host, layouts, quantities, read) {
     const of = [...new Set([...(its ? [its] : []), ...(units.get(quantity) ?? [])])];
     if (quantity && of.length && !of.includes(unit)) chosen[i].unit = of[0];
     const what = el("select", { "aria-label": `${heading} is` }, el("option", { value: "" }, "leave out"), quantities.map(({ name, words }) => el("option", { value: name, title: words, selected: name === quantity }, name)));
-    const unitOf = el("select", { "aria-label": `Unit of ${heading}`, disabled: !of.length }, of.length ? [] : el("option", { value: "" }, "–"), of.map((each) => el("option", { value: each, selected: each === chosen[i].unit }, each)));
+    const unitOf = el("select", { "aria-label": `Unit of ${heading}`, disabled: !of.length }, of.length ? [] : el("option", { value: "" }, "–"), options(of, chosen[i].unit));
     what.addEventListener("change", () => {
       chosen[i] = { heading, quantity: what.value, unit: layout.columns[i].unit ?? unit };
       draw();
@@ -58,8 +57,7 @@ export function askColumns(host, layouts, quantities, read) {
     command.textContent = used.map(({ heading, quantity, unit }) => `--column "${heading}=${quantity}${unit ? `:${unit}` : ""}"`).join(" ");
   }
 
-  form.addEventListener("submit", async (event) => {
-    event.preventDefault();
+  onSubmit(form, async () => {
     const columns = Object.fromEntries(chosen.filter(({ quantity }) => quantity).map(({ heading, quantity, unit }) => [heading, { quantity, unit }]));
     if (!(await read(layout, columns))) return;
     localStorage.setItem(KEPT, JSON.stringify({ ...kept(), [nameOf(layout)]: Object.fromEntries(chosen.map(({ heading, quantity, unit }) => [heading, { quantity, unit }])) }));

@@ -1,8 +1,8 @@
 // Measured data of the page: files that were chosen, dropped or pasted, read by the service against the scene.
 
 import { Problem, patiently, post } from "../network/api.js";
-import { byId, dropsOn, el, show } from "../base/dom.js";
-import { number, quantity } from "../base/format.js";
+import { button, byId, details, dropsOn, el, note, onFiles, show, table } from "../base/dom.js";
+import { number, valuesSaid } from "../base/format.js";
 import { asked } from "../scene/scenes.js";
 import { askColumns } from "./columns.js";
 
@@ -10,19 +10,26 @@ const PASTED = "pasted";
 let files = [];
 let changed = () => undefined;
 
+// Files to be chosen or dropped, or a table to be pasted; what was read, and what is wrong with it.
+export const dataPart = () => el("fieldset", { id: "identify-data" }, el("legend", {}, "Measured data"),
+  el("div", { class: "row" }, button("Choose files…", () => byId("identify-file").click(), { id: "identify-open" }),
+    el("input", { type: "file", id: "identify-file", class: "unseen", multiple: true, accept: ".csv,.tsv,.txt", "aria-label": "Files of measured data, CSV", tabindex: "-1" }),
+    el("span", { class: "note" }, "CSV at one or several levels; files may be dropped here too.")),
+  el("div", { id: "identify-files" }), el("div", { id: "identify-columns" }),
+  details("Paste a table", el("label", { for: "identify-paste" }, "Rows of CSV under a line of column heads"),
+    el("textarea", { id: "identify-paste", rows: 6, spellcheck: "false", placeholder: "# damper.N0 = 100\nfrequency [Hz],amplitude [mm],phase [deg]\n1.00,1930,-12" }),
+    el("div", { class: "row tight" }, button("Take it", paste, { id: "identify-paste-take" }))),
+  el("div", { id: "identify-data-wrong", class: "scroll", role: "alert" }));
+
 export function startData(onChange) {
   changed = onChange;
-  const input = byId("identify-file");
-  byId("identify-open").addEventListener("click", () => input.click());
-  input.addEventListener("change", async () => {
-    await takeFiles([...input.files]);
-    input.value = "";
-  });
-  byId("identify-paste-take").addEventListener("click", () => {
-    const text = byId("identify-paste").value;
-    if (text.trim()) take([{ name: fresh(PASTED), text }]).then((good) => { if (good) byId("identify-paste").value = ""; });
-  });
+  onFiles(byId("identify-file"), takeFiles);
   dropsOn(byId("identify-data"), (given) => takeFiles([...given.files]));
+}
+
+async function paste() {
+  const field = byId("identify-paste");
+  if (field.value.trim() && await take([{ name: fresh(PASTED), text: field.value }])) field.value = "";
 }
 
 // A name that no other file has.
@@ -94,10 +101,8 @@ const short = ({ file, line, column, detail }) => {
 };
 
 function issues(list) {
-  show(byId("identify-data-wrong"), list.length ? el("table", {},
-    el("caption", { class: "unseen" }, "What is wrong with the data"),
-    el("thead", {}, el("tr", {}, ["file", "line", "column", "what is wrong"].map((head) => el("th", { scope: "col" }, head)))),
-    el("tbody", {}, list.map((issue) => el("tr", {}, [issue.file, issue.line ?? "–", issue.column ?? "–", short(issue)].map((cell) => el("td", { class: "bad" }, String(cell))))))) : []);
+  const rows = list.map((issue) => [issue.file, issue.line ?? "–", issue.column ?? "–", short(issue)]);
+  show(byId("identify-data-wrong"), list.length ? table(["file", "line", "column", "what is wrong"], rows.map((row) => row.map((text) => ({ text: String(text), class: "bad" }))), "What is wrong with the data") : null);
 }
 
 export function clearData() {
@@ -120,14 +125,14 @@ export function fillData(data) {
   list();
 }
 
-const conditionsOf = (runs) => [...new Set(runs.map(({ conditions }) => Object.entries(conditions).map(([path, v]) => `${path} ${quantity(path, v)}`).join(", ")))];
+const conditionsOf = (runs) => [...new Set(runs.map(({ conditions }) => valuesSaid(conditions)))];
 
 export function list() {
   show(byId("identify-files"), files.length ? el("ul", { class: "plain" }, files.map((file) => el("li", { class: "measured" },
     el("strong", {}, file.name),
     el("span", { class: "note" }, file.runs.length ? ` ${file.runs.length} run${file.runs.length > 1 ? "s" : ""}, ${number(file.runs.reduce((sum, run) => sum + run.points, 0))} points: ${conditionsOf(file.runs).join(" · ") || "as the scene has it"}` : " of the run that is shown"),
-    el("button", { type: "button", "aria-label": `Remove ${file.name}`, onclick: () => {
+    button("×", () => {
       files = files.filter((each) => each !== file);
       changed();
-    } }, "×")))) : el("p", { class: "note" }, "No data yet."));
+    }, { "aria-label": `Remove ${file.name}` })))) : note("No data yet."));
 }

@@ -1,13 +1,13 @@
 // The fit over the data, and the tables that say how sure it is.
 
-import { el, table } from "../base/dom.js";
-import { largest, lengthUnit, number, quantity } from "../base/format.js";
+import { el, numeric, scrolled, scrolledTable } from "../base/dom.js";
+import { largest, lengthUnit, number, quantity, times, valuesSaid } from "../base/format.js";
 
 const COLOURS = 6;
 const SHAPES = ["circle", "square", "triangle", "diamond"];
 
 // What tells the runs apart: the conditions that are not the same in all.
-export function namesOf(runs) {
+function namesOf(runs) {
   const paths = [...new Set(runs.flatMap(({ conditions }) => Object.keys(conditions)))];
   const varied = paths.filter((path) => new Set(runs.map(({ conditions }) => conditions[path])).size > 1);
   return runs.map(({ conditions }, i) => varied.filter((path) => path in conditions).map((path) => `${path.split(".").pop()} ${quantity(path, conditions[path])}`).join(", ") || `run ${i + 1}`);
@@ -18,7 +18,7 @@ const style = (i) => ({ colour: 1 + (i % COLOURS), shape: SHAPES[i % SHAPES.leng
 // Data as points, the fit as a line through them, run after run.
 function over(runs, x, y, of, factor) {
   const names = namesOf(runs);
-  const up = (values) => (values ?? []).map((v) => (v === null ? null : v * factor));
+  const up = (values) => (values ?? []).map(times(factor));
   const data = runs.map((run, i) => ({ name: names[i], x: of(run.x), y: up(run[y]), ...style(i), width: 0, size: 3.2 }));
   const fits = runs.flatMap((run, i) => (run[x] ? [{ name: "", x: of(run.x), y: up(run[x]), colour: style(i).colour, width: 1.8 }] : []));
   return [...data, ...fits];
@@ -46,19 +46,15 @@ export function loopsChart(all) {
   const runs = all.filter(({ kind }) => kind === "loop");
   if (!runs.length) return null;
   const unit = lengthUnit(Math.max(...runs.map(({ x }) => largest(x))));
-  return { x: { name: `motion [${unit.name}]`, unit, pad: 0.06 }, y: { name: "force [N]", pad: 0.06 }, series: over(runs, "fit", "data", (x) => x.map((v) => v * unit.perMetre), 1) };
+  return { x: { name: `motion [${unit.name}]`, unit, pad: 0.06 }, y: { name: "force [N]", pad: 0.06 }, series: over(runs, "fit", "data", (x) => x.map(times(unit.perMetre)), 1) };
 }
-
-const scrolled = (label, node) => el("div", { class: "scroll", role: "region", "aria-label": label, tabindex: 0 }, node);
-
-const numeric = (text) => ({ text, number: true });
 
 export function estimatesTable({ estimates }) {
   const range = ([low, high], path) => `${number(low, 5)} to ${quantity(path, high)}`;
-  return scrolled("Estimates", table(["parameter", numeric("estimate"), numeric("± standard error"), "95 % interval", "bounds", "told by the data"],
+  return scrolledTable("Estimates", ["parameter", numeric("estimate"), numeric("± standard error"), "95 % interval", "bounds", "told by the data"],
     estimates.map((one) => [one.name, numeric(el("strong", {}, quantity(one.name, one.value))), numeric(one.standard_error === null ? "–" : number(one.standard_error, 3)),
       range(one.interval, one.name), one.bounds ? range(one.bounds, one.name) : "–",
-      el("span", { class: one.told ? "chip good" : "chip bad" }, one.told ? (one.at_bound ? "yes, at a bound" : "yes") : "no")]), "Estimates"));
+      el("span", { class: one.told ? "chip good" : "chip bad" }, one.told ? (one.at_bound ? "yes, at a bound" : "yes") : "no")]));
 }
 
 // Correlations as a table of heat: blue below 0, orange above, the number always.
@@ -74,11 +70,9 @@ export function correlationTable({ estimates, correlation }) {
     el("tbody", {}, correlation.map((row, i) => el("tr", {}, el("th", { scope: "row" }, estimates[i].name), row.map((value, j) => cell(value, i, j)))))));
 }
 
-const wordsOf = (conditions) => Object.entries(conditions).map(([path, v]) => `${path} ${quantity(path, v)}`).join(", ");
-
 export function candidatesTable({ candidates }) {
   if (!candidates.length) return null;
-  return scrolled("Measurements to make next", table(["measure next", numeric("tells more"), "narrows the error of"],
-    candidates.slice(0, 6).map((one, i) => [i ? wordsOf(one.conditions) : el("strong", {}, wordsOf(one.conditions)), numeric(number(one.gain, 3)),
-      one.tells ? `${one.tells} × ${number(one.factor, 2)}` : "–"]), "Measurements to make next"));
+  return scrolledTable("Measurements to make next", ["measure next", numeric("tells more"), "narrows the error of"],
+    candidates.slice(0, 6).map((one, i) => [i ? valuesSaid(one.conditions) : el("strong", {}, valuesSaid(one.conditions)), numeric(number(one.gain, 3)),
+      one.tells ? `${one.tells} × ${number(one.factor, 2)}` : "–"]));
 }

@@ -1,6 +1,6 @@
 // A nonlinear mode as charts: frequency and damping over the amplitude, peaks, loops, shape.
 
-import { largest, length, lengthUnit, number } from "../base/format.js";
+import { largest, length, lengthUnit, number, times } from "../base/format.js";
 
 const LINEAR = ["stuck", "separated", "closed"];
 const GHOSTS = [7, 5, 4, 3];
@@ -9,7 +9,7 @@ const GHOSTS = [7, 5, 4, 3];
 export function amplitudeOf(result, over) {
   if (over === "modal") return { name: "modal amplitude a [√kg m]", x: result.amplitude, of: (point) => point.amplitude, unit: undefined };
   const unit = lengthUnit(largest(result.max_abs));
-  return { name: `max |${result.dof}| [${unit.name}]`, unit, x: result.max_abs.map((v) => v * unit.perMetre), of: (point) => point.max_abs * unit.perMetre };
+  return { name: `max |${result.dof}| [${unit.name}]`, unit, x: result.max_abs.map(times(unit.perMetre)), of: (point) => point.max_abs * unit.perMetre };
 }
 
 const isLinear = (states) => states.every((state) => LINEAR.includes(state));
@@ -26,7 +26,7 @@ const describe = (result, i) =>
 
 function curveOf(result, key, over, pins, factor = 1) {
   const { name, unit, x } = amplitudeOf(result, over);
-  const y = result[key].map((v) => (v === null ? null : factor * v));
+  const y = result[key].map(times(factor));
   const stuck = result.states.map((states, i) => (isLinear(states) ? y[i] : null));
   return {
     x: { name, unit, log: true, pad: 0 },
@@ -35,7 +35,7 @@ function curveOf(result, key, over, pins, factor = 1) {
       ...(stuck.some((v) => v !== null) ? [{ name: "linear", x, y: stuck, colour: 3, width: 4 }] : []),
       ...pins.map((pin, i) => {
         const there = amplitudeOf(pin.result, over);
-        return { name: pin.name, x: there.x, y: pin.result[key].map((v) => (v === null ? null : factor * v)), colour: GHOSTS[i], dash: "dotted", width: 1.6 };
+        return { name: pin.name, x: there.x, y: pin.result[key].map(times(factor)), colour: GHOSTS[i], dash: "dotted", width: 1.6 };
       }),
     ],
     describe: (_x, _y, i) => describe(result, i),
@@ -73,7 +73,7 @@ export function performanceChart({ performance, dof }, by) {
   const exact = (performance.exact ?? []).filter(({ peak }) => peak !== null).map((one) => (loads ? { x: 1 / one.excitation, y: one.peak / one.excitation } : { x: one.excitation, y: one.peak }));
   const heights = [...peaks, ...exact.map(({ y }) => y)].filter((v) => v !== null && v > 0).sort((a, b) => a - b);
   const unit = lengthUnit(heights[Math.floor(heights.length / 2)] ?? 1);
-  const up = (v) => (v === null ? null : v * unit.perMetre);
+  const up = times(unit.perMetre);
   const least = loads ? performance.least : null;
   return {
     x: { name: loads ? "loads, × as they are" : "excitation, × as it is", log: true },
@@ -88,22 +88,13 @@ export function performanceChart({ performance, dof }, by) {
   };
 }
 
-// The point with loops and shapes that is nearest to a point of the curve; its place among them.
-export function nearestMotion({ motions }, point) {
-  let best = 0;
-  motions.points.forEach((each, i) => {
-    if (Math.abs(each - point) < Math.abs(motions.points[best] - point)) best = i;
-  });
-  return best;
-}
-
 export function loopChart({ motions }, at, contact) {
   const loop = motions.loops[contact];
   const unit = lengthUnit(largest(loop.motion[at]));
   return {
     x: { name: `motion of ${loop.contact} [${unit.name}]`, unit, pad: 0.06 },
     y: { name: "force [N]", pad: 0.08 },
-    series: [{ name: "", x: loop.motion[at].map((v) => v * unit.perMetre), y: loop.force[at], colour: 1, width: 2.4 }],
+    series: [{ name: "", x: loop.motion[at].map(times(unit.perMetre)), y: loop.force[at], colour: 1, width: 2.4 }],
   };
 }
 

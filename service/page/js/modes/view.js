@@ -1,18 +1,18 @@
 // Nonlinear modes: frequency and damping of a free motion over its amplitude, and what follows from them.
 
 import { state } from "../base/address.js";
-import { byId, el, facts, say, show } from "../base/dom.js";
+import { button, byId, el, facts, note, show, titled } from "../base/dom.js";
 import { on } from "../base/events.js";
 import { csvText, saveText } from "../base/exports.js";
-import { length, number, seconds } from "../base/format.js";
+import { length, nearestIn, number, seconds } from "../base/format.js";
 import { chart } from "../charts/chart.js";
 import { asked, current, value } from "../scene/scenes.js";
-import { putAll } from "../views/live.js";
 import { shapeCard } from "../shape/card.js";
-import { amplitudeOf, columnsOf, dampingChart, frequencyChart, loopChart, nearestMotion, performanceChart, shapeChart, stabilityOf, statesAt } from "./charts.js";
+import { putAll } from "../views/live.js";
+import { figurePart, formPart, statusPart, view } from "../views/view.js";
+import { amplitudeOf, columnsOf, dampingChart, frequencyChart, loopChart, performanceChart, shapeChart, stabilityOf, statesAt } from "./charts.js";
 
 const MOST_PINS = 4;
-const EMPTY = "Choose a mode and its amplitudes, then press “Follow the mode”.";
 let plots = null;
 let space = null;
 let last = null;
@@ -22,49 +22,54 @@ let over = "modal";
 let by = "load";
 let pins = [];
 
-export function startModes() {
-  const pick = (_point, at) => choose(at);
-  plots = {
-    frequency: chart(byId("modes-frequency"), { label: "Frequency over amplitude", file: "mode-frequency", height: 280, onPick: pick }),
-    damping: chart(byId("modes-damping"), { label: "Damping ratio over amplitude", file: "mode-damping", height: 280, onPick: pick }),
-    performance: chart(byId("modes-peaks"), { label: "Peak of the mode", file: "mode-peaks", height: 280 }),
-    loop: chart(byId("modes-loop"), { label: "Loop at the amplitude", file: "mode-loop", height: 280 }),
-    shape: chart(byId("modes-shape"), { label: "Shape at the amplitude", file: "mode-shape", height: 280 }),
-  };
-  space = shapeCard(byId("modes-shape-view"), { id: "mode-space", file: "mode-shape-in-space" });
-  on("scene-left", space.leave);
-  on("scene", () => {
+export const modes = view({
+  kind: "modes", id: "modes", title: "Nonlinear mode", tabs: "modes", wide: true, priority: 4,
+  form: {
+    words: "Follow the mode", primary: true, top: ["mode", "from", "to", "nodal_diameter", "aero_damping", "exact_peaks"],
+    groups: [{ legend: "Loops, peaks, disturbances, phase resonance", id: "more" }],
+  },
+  bar: { form: "modes-form", words: "Follow the mode", free: true },
+  about: "The free motion of a mode changes with its amplitude: stuck contacts are springs, sliding ones dampers.",
+  work: "mode", goes: ({ took, points }) => `Following the mode:${took}; ${points} points.`,
+  parts: () => [
+    formPart("modes"), statusPart("modes"), el("div", { class: "row", id: "modes-tools" }),
+    el("div", { class: "halves" }, titled("Frequency", figurePart("modes-frequency")), titled("Damping", figurePart("modes-damping"))),
+    el("div", { class: "thirds" },
+      titled("Peak over load and excitation", figurePart("modes-peaks"), el("div", { id: "modes-peaks-more" })),
+      titled("Hysteresis loop", figurePart("modes-loop"), el("div", { id: "modes-loop-more" })),
+      titled("Shape", figurePart("modes-shape"), el("div", { id: "modes-shape-view" }))),
+    el("div", { id: "modes-facts" }),
+  ],
+  start() {
+    const plot = (name, label, onPick) => chart(byId(`modes-${name}`), { label, file: `mode-${name}`, height: 280, onPick });
+    const pick = (_point, at) => choose(at);
+    plots = {
+      frequency: plot("frequency", "Frequency over amplitude", pick), damping: plot("damping", "Damping ratio over amplitude", pick),
+      performance: plot("peaks", "Peak of the mode"), loop: plot("loop", "Loop at the amplitude"), shape: plot("shape", "Shape at the amplitude"),
+    };
+    space = shapeCard(byId("modes-shape-view"), { id: "mode-space", file: "mode-shape-in-space" });
+    on("scene-left", space.leave);
+  },
+  scene() {
     [last, point, contact, pins] = [null, 0, 0, []];
-    clear();
-  });
-}
-
-function clear() {
-  plots.frequency.clear(EMPTY);
-  plots.damping.clear("Damping ratio, and the limit cycles of flutter.");
-  plots.performance.clear("Resonance peaks that follow from the mode.");
-  plots.loop.clear("Hysteresis loops of a chosen amplitude.");
-  plots.shape.clear("Shape at a chosen amplitude.");
-  space.offer({ ...asked(), mode: 1 }, "mode 1, contacts as at rest");
-  say("modes-status", "The free motion of a mode changes with its amplitude: stuck contacts are springs, sliding ones dampers.");
-  for (const id of ["modes-tools", "modes-facts", "modes-loop-more", "modes-peaks-more"]) show(byId(id));
-}
-
-export const modesView = {
-  waiting: () => say("modes-status", "The mode waits for a worker."),
-  progress: ({ took, points }) => say("modes-status", `Following the mode:${took}; ${points} points.`),
+    plots.frequency.clear("Choose a mode and its amplitudes, then press “Follow the mode”.");
+    plots.damping.clear("Damping ratio, and the limit cycles of flutter.");
+    plots.performance.clear("Resonance peaks that follow from the mode.");
+    plots.loop.clear("Hysteresis loops of a chosen amplitude.");
+    plots.shape.clear("Shape at a chosen amplitude.");
+    space.offer({ ...asked(), mode: 1 }, "mode 1, contacts as at rest");
+    for (const id of ["modes-tools", "modes-loop-more", "modes-peaks-more"]) show(byId(id));
+  },
   result(result, _sweeps, job) {
-    if (!result.amplitude.length) return say("modes-status", result.status, true);
+    if (!result.amplitude.length) return modes.say(result.status, true);
     last = { result, request: job.request };
     // Where most is damped there is most to see.
     point = result.damping_ratio.indexOf(Math.max(...result.damping_ratio));
     contact = Math.min(contact, Math.max((result.motions?.loops.length ?? 1) - 1, 0));
-    say("modes-status", `${result.amplitude.length} points in ${seconds(result.seconds)}. ${result.status}`);
-    draw();
-    return undefined;
+    modes.say(`${result.amplitude.length} points in ${seconds(result.seconds)}. ${result.status}`);
+    return draw();
   },
-  failed: (words) => say("modes-status", words, true),
-};
+});
 
 function draw() {
   drawCurves();
@@ -86,9 +91,9 @@ function drawPerformance() {
   const choices = performance.scales ? [["load", "over the loads"], ["excitation", "over the excitation"]] : [];
   const loads = loadsAt(performance.least?.load);
   show(byId("modes-peaks-more"), el("div", { class: "row" },
-    choices.map(([key, words]) => el("button", { type: "button", "aria-pressed": String(key === by), onclick: () => { by = key; drawPerformance(); } }, words)),
-    Object.keys(loads).length ? el("button", { type: "button", onclick: () => putAll({ ...state.set, ...loads }) }, `Use the loads × ${number(performance.least.load, 3)}`) : null),
-    performance.scales ? null : el("p", { class: "note" }, "Forces, loads and motions do not grow together here: peaks over the loads are not known."));
+    choices.map(([key, words]) => button(words, () => { by = key; drawPerformance(); }, { "aria-pressed": String(key === by) })),
+    Object.keys(loads).length ? button(`Use the loads × ${number(performance.least.load, 3)}`, () => putAll({ ...state.set, ...loads })) : null),
+    performance.scales ? null : note("Forces, loads and motions do not grow together here: peaks over the loads are not known."));
   return undefined;
 }
 
@@ -99,7 +104,7 @@ function loadsAt(factor) {
   return Object.fromEntries(loads.map(({ path }) => [path, value(path)]).filter(([, load]) => load !== 0).map(([path, load]) => [path, Number((load * factor).toPrecision(6))]));
 }
 
-// Another point of the curve: its loop, its shape, what the contacts do there.
+// Another point of the curve, or the one nearest to it that has them: its loop, its shape, what the contacts do there.
 function choose(at) {
   point = at;
   const { result } = last;
@@ -108,23 +113,22 @@ function choose(at) {
     plots.shape.clear("It was not asked for shapes.");
     return;
   }
-  const there = nearestMotion(result, point);
-  offerShape(result.motions.points[there]);
+  const there = nearestIn(result.motions.points, point);
   const shown = result.motions.points[there];
+  offerShape(shown, there);
   if (result.motions.loops.length) plots.loop.draw(loopChart(result, there, contact));
   else plots.loop.clear("The scene has no contacts.");
   plots.shape.draw(shapeChart(result, there));
   const names = result.motions.loops.map((loop) => loop.contact);
   show(byId("modes-loop-more"),
     el("p", { class: "note", role: "status" }, `At a = ${number(result.amplitude[shown], 4)} √kg m, max |${result.dof}| ${length(result.max_abs[shown])}: ${statesAt(result, shown)}. A click on a curve above shows another amplitude.`),
-    el("div", { class: "row" }, names.length > 1 ? names.map((name, i) => el("button", { type: "button", "aria-pressed": String(i === contact), onclick: () => { contact = i; choose(point); } }, name)) : null));
+    el("div", { class: "row" }, names.length > 1 ? names.map((name, i) => button(name, () => { contact = i; choose(point); }, { "aria-pressed": String(i === contact) })) : null));
 }
 
 // The shape in space at a point of the curve.
-function offerShape(at) {
+function offerShape(at, there) {
   const { result, request } = last;
   const { scene, set = {}, harmonics = result.n_harmonics } = request;
-  const there = result.motions.points.indexOf(at);
   const { dofs, shapes: { real, imag } } = result.motions;
   const states = Object.fromEntries(result.contacts.map((name, i) => [name, result.states[at][i]]));
   const body = { scene, set, harmonics, motion: { dofs, real: real[there], imag: imag[there], frequency_hz: result.frequency[at], states } };
@@ -134,7 +138,6 @@ function offerShape(at) {
 
 function tools() {
   const { result, request } = last;
-  const button = (words, act, more = {}) => el("button", { type: "button", ...more, onclick: act }, words);
   const own = Object.entries(request.set ?? {}).map(([path, v]) => `${path} ${number(v)}`).slice(-2).join(", ");
   show(byId("modes-tools"),
     button("over modal amplitude", () => { over = "modal"; redraw(); }, { "aria-pressed": String(over === "modal") }),
@@ -160,7 +163,7 @@ function describe() {
   const worst = (key) => result[key].reduce((most, v) => (v !== null && v > most ? v : most), 0);
   const { performance, limit_cycles: flutter } = result;
   const exact = (performance?.exact ?? []).filter(({ peak }) => peak === null).length;
-  show(byId("modes-facts"), facts([
+  modes.facts(facts([
     ["mode", `${result.mode}${result.nodal_diameter === null ? "" : `, nodal diameter ${result.nodal_diameter}`}, ${result.n_harmonics} harmonics`],
     ["at small amplitudes", `${number(result.frequency[0], 6)} Hz, ζ ${number(100 * result.damping_ratio[0], 4)} %`],
     ["most damping", `ζ ${number(100 * result.damping_ratio[best], 4)} % at ${number(result.frequency[best], 6)} Hz, max |${result.dof}| ${length(result.max_abs[best])}`],

@@ -22,7 +22,7 @@ export class Offline extends Error {
   }
 }
 
-export const key = () => sessionStorage.getItem(KEY) ?? "";
+const key = () => sessionStorage.getItem(KEY) ?? "";
 
 export function setKey(value) {
   if (value) sessionStorage.setItem(KEY, value);
@@ -32,6 +32,9 @@ export function setKey(value) {
 export const pause = (seconds) => new Promise((resolve) => setTimeout(resolve, seconds * 1000));
 
 const authorised = (headers) => (key() ? { ...headers, Authorization: `Bearer ${key()}` } : headers);
+
+// What is changed must be as it was known.
+export const patched = (path, { revision }, body) => request(path, { method: "PATCH", body, headers: { "If-Match": `"${revision}"` } });
 
 // A raw answer of the service; Offline if there is none, Problem if it refuses.
 export async function fetched(path, { method = "GET", body, raw, headers = {}, signal } = {}) {
@@ -59,6 +62,15 @@ export async function fetched(path, { method = "GET", body, raw, headers = {}, s
 export async function request(path, options) {
   const answer = await fetched(path, options);
   return answer.status === 204 ? null : answer.json();
+}
+
+// Does something of which a failure is said, not thrown.
+export async function orNotice(act, said = (error) => error.message) {
+  try {
+    return await act();
+  } catch (error) {
+    return tell("notice", said(error));
+  }
 }
 
 // Every item of a list that comes in pages.
@@ -91,7 +103,7 @@ export function lost() {
   back = (async () => {
     for (let turn = 0; offline; turn += 1) {
       await pause(BACKOFF[Math.min(turn, BACKOFF.length - 1)]);
-      offline = !(await alive());
+      offline = !(await health().then(({ ok }) => ok, () => false));
     }
     tell("online");
   })();
@@ -99,14 +111,6 @@ export function lost() {
 }
 
 const health = () => fetch("/health/ready", { cache: "no-store" });
-
-async function alive() {
-  try {
-    return (await health()).ok;
-  } catch {
-    return false;
-  }
-}
 
 // Tells what the service still starts, in its own words, until all is there.
 export async function watchStart() {
@@ -128,9 +132,4 @@ export async function patiently(attempt) {
       await lost();
     }
   }
-}
-
-export async function blobOf(path, accept, options = {}) {
-  const answer = await fetched(path, { ...options, headers: { ...(options.headers ?? {}), Accept: accept } });
-  return answer.blob();
 }

@@ -3,7 +3,7 @@
 import { Problem, patiently, post, request } from "./api.js";
 import { state, write } from "../base/address.js";
 import { on, tell } from "../base/events.js";
-import { timing } from "../base/timing.js";
+import { timing } from "../base/format.js";
 import { lastTold } from "../workbench/run_list.js";
 import { watch } from "./stream.js";
 

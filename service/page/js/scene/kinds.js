@@ -1,14 +1,17 @@
-// The studies of the service: the keys of each by the schema of its body, and what the scene suggests for it.
+// The studies of the service: the keys of each by the schema of its body, and what the scene suggests for it; its contact
+// laws with their parameters.
 
 import { request } from "../network/api.js";
 import { fieldsOf } from "../forms/fields.js";
 import { state } from "../base/address.js";
 import { on, tell } from "../base/events.js";
-import { seconds } from "../base/format.js";
+import { learnUnits, seconds } from "../base/format.js";
 import { asked, current, variable } from "./scenes.js";
 
 // The scene, the run and the queue are asked for elsewhere on the page.
 const OF_THE_PAGE = ["kind", "scene", "set", "fresh", "priority", "max_seconds", "project", "name", "notes", "tags"];
+// What the bar says has no field a second time.
+export const OF_THE_BAR = ["parameter", "from", "to", "variables", "scaling", "start"];
 let kinds = new Map();
 let price = 0;
 on("cost", (cost) => { price = cost; });
@@ -51,3 +54,15 @@ export const takes = (...names) => (secondsOf(...names) ? `about ${seconds(secon
 
 // Why the scene has no such study; empty if it has.
 export const refusedFor = (name) => proposal(name)?.refused ?? "";
+
+let laws = new Map();
+let usual = null;
+
+export async function loadLaws() {
+  const { items } = await request("/v1/laws");
+  laws = new Map(items.map((law) => [law.name, law.parameters]));
+  usual = items.find((law) => law.default).name;
+  learnUnits(items.flatMap((law) => law.parameters).map(({ name, unit }) => [name, unit]));
+}
+
+export const parameterOf = (contact, key) => laws.get(contact.law ?? usual)?.find(({ name }) => name === key);

@@ -1,13 +1,12 @@
 // Matrices of a finite-element program become a scene: files in, what was read, what is needed, the editor.
 
 import { Problem, post, request } from "../network/api.js";
-import { byId, el, facts, say, show } from "../base/dom.js";
+import { button, byId, details, el, facts, onFiles, onSubmit, say, show } from "../base/dom.js";
 import { edit } from "../editor/editor.js";
 import { on } from "../base/events.js";
 import { number } from "../base/format.js";
-import { joined } from "../disk/sector_form.js";
-import { matrixFiles } from "./matrix_files.js";
-import { matrixForm } from "./matrix_form.js";
+import { matrixFiles } from "./files.js";
+import { joined, matrixForm } from "./matrix_form.js";
 
 const MOST_SUFFIXES = 4;
 let files = null;
@@ -51,25 +50,19 @@ function build(panel) {
   const list = el("ul", { class: "plain", id: "matrix-files" });
   const rest = el("form", { novalidate: true, id: "matrix-form", hidden: true });
   const fields = el("div");
-  input.addEventListener("change", () => {
-    if (input.files.length) files.add(input.files);
-    input.value = "";
-  });
+  onFiles(input, (given) => files.add(given));
   show(panel,
     el("fieldset", { id: "matrix-drop" }, el("legend", {}, "Files of matrices"),
-      el("div", { class: "row" }, el("button", { type: "button", id: "matrix-choose", onclick: () => input.click() }, "Choose files…"), input,
+      el("div", { class: "row" }, button("Choose files…", () => input.click(), { id: "matrix-choose" }), input,
         el("span", {}, "or drop them here: mass and stiffness; damping, the names of the rows, and the deck of a sector of a disk if there are such.")),
-      el("details", {}, el("summary", {}, "Which files?"), el("div", { id: "matrix-formats" })),
+      details("Which files?", el("div", { id: "matrix-formats" })),
       list, el("p", { id: "matrix-status", class: "status", role: "status" }), el("div", { id: "matrix-report" })),
-    rest, el("div", { class: "row" }, el("button", { type: "button", onclick: close }, "Close")));
+    rest, el("div", { class: "row" }, button("Close", close)));
   show(rest, fields, el("div", { class: "row" }, el("button", { type: "submit", class: "main-button" }, "Make the scene"), el("p", { id: "matrix-made", role: "status" })));
   files = matrixFiles(list, arrived);
   form = matrixForm(fields, { onUnits: () => arrived(false) });
   formats(input);
-  rest.addEventListener("submit", (event) => {
-    event.preventDefault();
-    make();
-  });
+  onSubmit(rest, make);
 }
 
 // Looks at what was sent: anew, or with what each file is as chosen.
@@ -81,7 +74,7 @@ async function arrived(anew) {
     show(byId("matrix-report"));
     return say("matrix-status", files.broken() ? "No file could be read; each says why." : "", files.broken());
   }
-  const { units } = { units: form.units() };
+  const units = form.units();
   const chosen = files.structure();
   say("matrix-status", "The files are being looked at …");
   try {

@@ -1,11 +1,12 @@
-// What a scene of matrices needs beside its files: DOFs by name, what acts on them, what is kept.
+// What a scene of matrices needs beside its files: DOFs by name, what acts on them, what is kept; of one sector of a disk
+// besides how many there are, the boundaries, the wave.
 
-import { el, show } from "../base/dom.js";
-import { sectorForm } from "../disk/sector_form.js";
+import { button, el, options, show } from "../base/dom.js";
 
 const GROUND = "ground";
 const FEW_ROWS = 300;
 const USUAL_MODES = 20;
+const AXES = { z: [0, 0, 1], y: [0, 1, 0], x: [1, 0, 0] };
 let count = 0;
 
 // A control with its label above and what is wrong below; its pointers are those of the issues about it.
@@ -25,9 +26,16 @@ function field(label, control, pointers, hint = "") {
   return node;
 }
 
+const group = (title, ...content) => el("fieldset", {}, el("legend", {}, title), ...content);
 const text = (value, more = {}) => el("input", { type: "text", spellcheck: false, autocomplete: "off", value, ...more });
 const filled = (value, more) => {
   const input = text(value, more);
+  input.setAttribute("value", value);
+  return input;
+};
+
+const amount = (value, more) => {
+  const input = el("input", { type: "number", min: 0, ...more });
   input.setAttribute("value", value);
   return input;
 };
@@ -37,10 +45,9 @@ export function matrixForm(host, { onUnits }) {
   const contacts = el("div", { class: "matrix-rows" });
   const places = el("datalist", { id: "matrix-places" });
   const name = filled("my-model");
-  const units = el("select", {}, [["SI", "kg, N, m, s"], ["mm", "t, N, mm, s"], ["in", "lbf s²/in, lbf, in, s"]].map(([value, words]) => el("option", { value }, words)));
+  const units = el("select", {}, options([["SI", "kg, N, m, s"], ["mm", "t, N, mm, s"], ["in", "lbf s²/in, lbf, in, s"]]));
   const modes = el("input", { type: "number", min: 0, max: 1000, step: 1 });
-  const damping = el("input", { type: "number", min: 0, step: "any", value: 0.001 });
-  damping.setAttribute("value", "0.001");
+  const damping = amount("0.001", { step: "any" });
   const force = el("select", {});
   const observed = el("select", {});
   let named = [];
@@ -56,7 +63,7 @@ export function matrixForm(host, { onUnits }) {
     one.node = el("div", { class: "fields" },
       field("Name", label, () => []),
       (one.field = field("Node and direction, or row", row, () => [`/structure/dofs/${label.value.trim()}`])),
-      el("button", { type: "button", "aria-label": `Leave out the DOF ${given}`, onclick: () => { named = named.filter((each) => each !== one); one.node.remove(); choices(); } }, "Leave out"));
+      button("Leave out", () => { named = named.filter((each) => each !== one); one.node.remove(); choices(); }, { "aria-label": `Leave out the DOF ${given}` }));
     label.addEventListener("change", choices);
     named.push(one);
     dofs.append(one.node);
@@ -73,7 +80,7 @@ export function matrixForm(host, { onUnits }) {
       field("Contact", label, () => [`/contacts/${at()}/name`, `/contacts/${at()}`]),
       field("rubs between", ends[0], () => [`/contacts/${at()}/between/0`, `/contacts/${at()}/between`]),
       field("and", ends[1], () => [`/contacts/${at()}/between/1`]),
-      el("button", { type: "button", "aria-label": `Leave out the contact ${given}`, onclick: () => { rubbing = rubbing.filter((each) => each !== one); one.node.remove(); } }, "Leave out"));
+      button("Leave out", () => { rubbing = rubbing.filter((each) => each !== one); one.node.remove(); }, { "aria-label": `Leave out the contact ${given}` }));
     rubbing.push(one);
     contacts.append(one.node);
     choices();
@@ -83,10 +90,10 @@ export function matrixForm(host, { onUnits }) {
   // The names of the DOFs in every list that offers them; what was chosen stays.
   function choices() {
     const names = named.map(({ label }) => label.value.trim()).filter(Boolean);
-    const offer = (select, options, first) => {
+    const offer = (select, these, first) => {
       const before = select.value;
-      show(select, options.map((option) => el("option", { value: option }, option)));
-      select.value = options.includes(before) ? before : (first ?? options[0] ?? "");
+      show(select, options(these));
+      select.value = these.includes(before) ? before : (first ?? these[0] ?? "");
     };
     offer(force, names, names[1] ?? names[0]);
     offer(observed, names, names[0]);
@@ -107,9 +114,8 @@ export function matrixForm(host, { onUnits }) {
     field("Name of the scene", name, () => ["/name"]),
   ];
 
-  disk = sectorForm(field, choices);
-  const group = (title, ...content) => el("fieldset", {}, el("legend", {}, title), ...content);
-  const more = (words, add) => el("button", { type: "button", onclick: () => add().focus() }, words);
+  disk = sectorForm(choices);
+  const more = (words, add) => button(words, () => add().focus());
   show(host, places,
     group("Units and reduction", el("div", { class: "fields" }, others.slice(0, 3))),
     disk.node,
@@ -167,4 +173,66 @@ export function matrixForm(host, { onUnits }) {
     // DOFs without a place are said before anything is asked.
     missing: () => named.filter(({ row }) => !row.value.trim()).map(({ label }) => ({ pointer: `/structure/dofs/${label.value.trim()}`, detail: "A node and direction, or a row, is needed." })),
   };
+}
+
+// A set of the deck by its name, or nodes with commas.
+const nodes = (written) => {
+  const parts = written.split(",").map((part) => part.trim()).filter(Boolean);
+  return parts.length && parts.every((part) => /^\d+$/.test(part)) ? parts.map(Number) : written.trim();
+};
+
+// The part about a sector; `changed` is told when it becomes a disk or none.
+function sectorForm(changed) {
+  const sets = el("datalist", { id: "matrix-sets" });
+  const sectors = el("input", { type: "number", min: 1, max: 10000, step: 1, id: "matrix-sectors" });
+  const [low, high] = ["matrix-low", "matrix-high"].map((id) => text(undefined, { list: "matrix-sets", id }));
+  const axis = el("select", {}, options(Object.keys(AXES)));
+  const order = amount("1", { max: 10000, step: 1 });
+  let reduced = false;
+  const many = field("Sectors", sectors, () => ["/structure/sectors"], "How many make the disk. Left empty, the files are the whole structure.");
+  const ends = [
+    field("Boundary to the sector before", low, () => ["/structure/cyclic/low", "/structure/cyclic/low_rows"], "A set of the deck, or nodes with commas."),
+    field("Boundary to the next one", high, () => ["/structure/cyclic/high", "/structure/cyclic/high_rows"], "Where the other comes when turned about the axis by the right-hand rule."),
+  ];
+  const rest = [
+    field("Axis of the disk", axis, () => ["/structure/cyclic/axis", "/structure/cyclic"]),
+    field("Engine order of the force", order, () => ["/excitation/engine_order", "/excitation/0/engine_order"]),
+  ];
+  const isDisk = () => sectors.value !== "";
+  function update() {
+    for (const node of ends) node.hidden = !isDisk() || reduced;
+    for (const node of rest) node.hidden = !isDisk();
+    changed(isDisk());
+  }
+  sectors.addEventListener("input", update);
+  for (const node of [...ends, ...rest]) node.hidden = true;
+
+  return {
+    fields: [many, ...ends, ...rest],
+    node: group("One sector of a disk", sets, el("div", { class: "fields" }, [many, ...ends, ...rest])),
+    isDisk,
+    learn({ sets: found, structure }) {
+      show(sets, (found ?? []).map(({ name, nodes: n }) => el("option", { value: name, label: `${n} nodes` })));
+      for (const [input, name] of [[low, "LOW"], [high, "HIGH"]]) if (!input.value && (found ?? []).some((set) => set.name === name)) input.value = name;
+      reduced = Boolean(structure.diameters);
+      update();
+    },
+    // The keys of a structure; `modes` is how many are kept of the rest, if any.
+    structure(modes) {
+      const cyclic = { axis: AXES[axis.value] };
+      if (!reduced && low.value.trim()) cyclic.low = nodes(low.value);
+      if (!reduced && high.value.trim()) cyclic.high = nodes(high.value);
+      if (!reduced && modes !== undefined) cyclic.keep_modes = modes;
+      return { sectors: sectors.valueAsNumber, cyclic };
+    },
+    excitation: () => (isDisk() && Number.isFinite(order.valueAsNumber) ? { engine_order: order.valueAsNumber } : {}),
+  };
+}
+
+// The keys that refer to files with those of the form: a deck is of use to a sector alone, and not to a reduced one.
+export function joined(files, form) {
+  const { cyclic: deck, ...given } = files;
+  const { cyclic, ...wanted } = form;
+  if (!cyclic) return { ...given, ...wanted };
+  return { ...given, ...wanted, cyclic: { ...(given.diameters ? {} : deck), ...cyclic } };
 }

@@ -1,7 +1,7 @@
 // The variable, its range and the number of harmonics: what is wrong is said beside its field.
 
 import { state, write } from "../base/address.js";
-import { byId, say, show, el } from "../base/dom.js";
+import { byId, options, say, show } from "../base/dom.js";
 import { tell } from "../base/events.js";
 import { unitOf } from "../base/format.js";
 import { chooseVariable, defaultRange, variable, variables } from "./scenes.js";
@@ -23,7 +23,7 @@ export function startSettings() {
 
 export function fillSettings() {
   const path = variable();
-  show(byId("variable"), variables().map((each) => el("option", { value: each }, each)));
+  show(byId("variable"), options(variables()));
   byId("variable").value = path;
   byId("variable-unit").textContent = unitOf(path);
   if (!path) say("study-status", "The scene has no contact to design.");

@@ -1,10 +1,10 @@
 // The drawing of a scene: masses, springs, contacts with what they do.
 
-import { el, show, svg, table } from "../base/dom.js";
+import { el, note, numeric, show, svg, table } from "../base/dom.js";
 import { number } from "../base/format.js";
-import { drawSector } from "../disk/sector.js";
 import { GROUND, chain, ownName, partsOf, ring } from "./layout.js";
 import { current, value } from "./scenes.js";
+import { drawSector } from "./sector.js";
 
 export const STATES = {
   "stuck": ["is-stick", "sticks"],
@@ -64,7 +64,7 @@ function stateKey() {
 // The contacts as a table, with what they do at the frequency `at` [Hz].
 export function contactTable(states, at) {
   const { joints } = current;
-  if (!joints.length) return el("p", { class: "note" }, "The scene has no contacts: it is linear.");
+  if (!joints.length) return note("The scene has no contacts: it is linear.");
   const own = ({ slider, otherwise }) => slider && !otherwise;
   const columns = [...new Map([...current.parameters.values()].filter((each) => own(each) && joints.some(({ name }) => name === each.part)).map((each) => [each.name, each])).values()];
   const laws = new Set(joints.map(({ law }) => law)).size > 1;
@@ -72,10 +72,10 @@ export function contactTable(states, at) {
     joint.name, joint.between.join(" – "), statesOf(states, joint), ...(laws ? [joint.law] : []),
     ...columns.map(({ name, unit }) => {
       const path = `${joint.name}.${name}`;
-      return { text: own(current.parameters.get(path) ?? {}) ? `${number(value(path))} ${unit}`.trim() : "", number: true };
+      return numeric(own(current.parameters.get(path) ?? {}) ? `${number(value(path))} ${unit}`.trim() : "");
     }),
   ]);
-  const heads = columns.map(({ symbol }) => ({ text: symbol, number: true }));
+  const heads = columns.map(({ symbol }) => numeric(symbol));
   return table(["contact", "between", at ? `at ${number(at, 5)} Hz` : "state", ...(laws ? ["law"] : []), ...heads], rows, at ? `Contacts at ${number(at, 5)} Hz` : "Contacts");
 }
 

@@ -1,6 +1,6 @@
 // The card of a shape: opened by a button, then it follows what is looked at; played, turned, enlarged, saved.
 
-import { byId, el, say, show } from "../base/dom.js";
+import { button as buttonOf, byId, el, note, options, say, show } from "../base/dom.js";
 import { on } from "../base/events.js";
 import { paperColour, saveBlob } from "../base/exports.js";
 import { lengthUnit, number } from "../base/format.js";
@@ -44,20 +44,20 @@ export function shapeCard(host, { id, file }) {
 
 function build(self) {
   const { id } = self;
-  const button = (text, label, onclick) => el("button", { type: "button", "aria-label": label, title: label, onclick }, text);
+  const button = (text, label, act) => buttonOf(text, act, { "aria-label": label, title: label });
   const parts = {
     status: el("p", { class: "note", role: "status", id: `${id}-status` }),
-    open: el("button", { type: "button", id: `${id}-open`, onclick: () => { self.opened = true; ask(self); } }),
+    open: buttonOf("", () => { self.opened = true; ask(self); }, { id: `${id}-open` }),
     canvas: null,
     art: el("div", { class: "shape-art" }),
-    by: el("select", { id: `${id}-by`, "aria-label": "Coloured by", onchange: () => { self.stage.colourBy(parts.by.value); drawKey(self); } }, el("option", { value: "amplitude" }, "amplitude"), el("option", { value: "state" }, "contact state")),
+    by: el("select", { id: `${id}-by`, "aria-label": "Coloured by", onchange: () => { self.stage.colourBy(parts.by.value); drawKey(self); } }, options(["amplitude", ["state", "contact state"]])),
     at: el("input", { type: "range", id: `${id}-at`, min: 0, max: STEPS, step: 1, "aria-label": "Angle in the period", oninput: () => { pause(self); move(self); } }),
     play: button("▶", "Play", () => (self.playing ? pause(self) : play(self))),
     whole: button("⤢", "Whole view", () => enlarge(self)),
     png: button("PNG", "Save this frame as PNG", () => save(self, 1)),
     frames: button("Frames", `Save ${FRAMES} frames of a period as PNG`, () => save(self, FRAMES)),
     key: el("div", { class: "key" }),
-    notes: el("p", { class: "note" }),
+    notes: note(),
     dialog: el("dialog", { class: "shape-whole", "aria-label": "Shape, whole view" }),
   };
   parts.at.value = "0";

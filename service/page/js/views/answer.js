@@ -1,7 +1,7 @@
 // The answer in large figures: what to build, the peak and the band before and after, how far to trust it.
 
 import { state } from "../base/address.js";
-import { byId, el, show } from "../base/dom.js";
+import { byId, el, note, show } from "../base/dom.js";
 import { on } from "../base/events.js";
 import { saveFrom } from "../base/exports.js";
 import { length, lengthUnit, number, quantity } from "../base/format.js";
@@ -9,7 +9,7 @@ import { previewer } from "../network/previews.js";
 import { inUse, sameValues } from "../scene/inputs.js";
 import { givenByScene, variable } from "../scene/scenes.js";
 import { load } from "./design.js";
-import { changedSince, isUnderway, renewButton } from "./renewal.js";
+import { changedSince, isUnderway, staleWords } from "./renewal.js";
 import { pressTakes } from "./study.js";
 
 let designed = null;
@@ -32,8 +32,7 @@ export function startAnswer() {
     if (designed && !known()) askBefore();
     draw();
   });
-  on("staleness", draw);
-  on("scene", draw);
+  for (const event of ["staleness", "scene"]) on(event, draw);
   on("cost", () => designed === null && draw());
 }
 
@@ -53,7 +52,7 @@ function draw() {
   byId("answer-actions").hidden = empty;
   byId("answer").classList.toggle("is-stale", !empty && changedSince("design").length > 0);
   if (empty) {
-    show(host, el("p", { class: "note" }, isUnderway("design")
+    show(host, note(isUnderway("design")
       ? "The search for the best damper is under way."
       : variable() ? `No design yet: Find the best damper searches ${variable()} over its range and draws the other views${pressTakes() && `, ${pressTakes()}`}.` : "No design: the scene has no contact to design."));
     show(byId("answer-stale"));
@@ -66,10 +65,7 @@ function draw() {
 
 function actions() {
   const { request, result } = designed;
-  const changed = changedSince("design");
-  show(byId("answer-stale"), changed.length
-    ? [el("strong", {}, "Stale"), el("span", {}, ` computed for ${changed.join("; ")}. `), renewButton("design", "Find it again")]
-    : []);
+  show(byId("answer-stale"), staleWords("design", changedSince("design"), "Find it again"));
   const used = inUse(request, result.optimum);
   const use = byId("use-design");
   use.textContent = used ? "In use" : "Use";

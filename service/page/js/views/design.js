@@ -1,51 +1,55 @@
-// The best design, and the plan of the scene.
+// The best design: what holds it, what one per cent of each parameter does to it, and the plan of the scene.
 
-import { Problem, patiently, post } from "../network/api.js";
 import { state } from "../base/address.js";
-import { byId, el, facts, say, show } from "../base/dom.js";
+import { bad, button, byId, el, details, facts, note, numeric, scrolledTable, show, titled } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
-import { length, number, quantity, seconds } from "../base/format.js";
+import { length, number, quantity, seconds, valuesSaid } from "../base/format.js";
 import { notes } from "../base/words.js";
-import { putAll } from "./live.js";
+import { Problem, patiently, post } from "../network/api.js";
+import { previewer } from "../network/previews.js";
 import { asked } from "../scene/scenes.js";
-import { basinsOf, conditionsOf, limitsOf, robustOf } from "./held.js";
+import { putAll } from "./live.js";
+import { statusPart, view } from "./view.js";
 
+const FIRST = 6;
 let token = 0;
+let wish = "";
+let cases = false;
 
-export function startDesign() {
-  on("scene", () => {
-    say("design-status", "Not searched for yet.");
-    show(byId("design-facts"));
-    plan();
-  });
-  on("settled", plan);
-}
-
-export const designView = {
-  waiting: () => say("design-status", "The search waits for a worker."),
-  progress({ took, points, best }) {
-    say("design-status", `Searching:${took}${points ? `, ${points} evaluations` : ""}.`);
-    if (best) showBest(best);
+export const design = view({
+  kind: "design", id: "design", title: "Best design", tabs: "design", priority: 5,
+  bar: { form: "problem-form", words: "Search this design" },
+  about: "Not searched for yet.",
+  work: "search", goes: ({ took, points }) => `Searching:${took}${points ? `, ${points} evaluations` : ""}.`,
+  parts: () => [statusPart("design"), el("div", { id: "design-facts" }), el("div", { id: "design-sensitivities" }),
+    el("details", { id: "plan" }, el("summary", {}, "Plan: effects in use and left out"), el("div", { id: "plan-facts" }))],
+  start() {
+    on("settled", plan);
+    startSensitivities();
+  },
+  scene: plan,
+  progress(job) {
+    design.say(design.goes(job));
+    if (job.best) showBest(job.best);
   },
   result(result, _sweeps, job) {
-    const use = (found) => load(found, job.request);
+    const use = (these) => load(these, job.request);
     const values = Object.entries(result.optimum ?? {});
-    const button = values.length ? el("button", { type: "button", onclick: () => use(result.optimum) }, "Load this design") : null;
+    const take = values.length ? button("Load this design", () => use(result.optimum)) : null;
+    const found = values.map(([path, v]) => [path, el("strong", {}, quantity(path, v))]);
     if ("aim" in result) {
-      say("design-status", result.status);
-      show(byId("design-facts"), facts(values.map(([path, v]) => [path, el("strong", {}, quantity(path, v))])), robustOf(result), button);
-      return;
+      design.say(result.status);
+      return design.facts(facts(found), robustOf(result), take);
     }
-    say("design-status", `Found in ${seconds(result.seconds)} with ${result.evaluations} responses. ${result.status}`);
-    show(
-      byId("design-facts"),
+    design.say(`Found in ${seconds(result.seconds)} with ${result.evaluations} responses. ${result.status}`);
+    design.facts(
       facts([
-        ...values.map(([path, v]) => [path, el("strong", {}, quantity(path, v))]),
+        ...found,
         ["highest peak", result.peak ? `${length(result.peak.value)} at ${number(result.peak.at, 6)} Hz` : "–"],
         ...Object.entries(result.plateau ?? {}).map(([path, [low, high]]) => [`${path}, as good`, `${quantity(path, low)} to ${quantity(path, high)}`]),
         ...(result.chosen_by ? [["chosen by", result.chosen_by]] : []),
         ...(typeof result.error_estimate === "number" ? [["estimated error", length(result.error_estimate)]] : []),
-        ...(result.warnings ?? []).map((words) => ["warning", el("span", { class: "bad" }, words)]),
+        ...(result.warnings ?? []).map((words) => ["warning", bad(words)]),
         ...notes({ notes: result.notes, warnings: result.warnings }),
         ["resonance band", result.band_hz === null ? "–" : `${number(result.band_hz)} Hz above ${length(result.limit)}`],
         ...furtherOf(result).map(({ quantity: name, value, unit, what }) => [name, `${unit === "m" ? length(value) : `${number(value)} ${unit}`}: ${what}`]),
@@ -53,18 +57,19 @@ export const designView = {
         ...(result.certainty ? [["certain", result.certainty]] : []),
         ...(result.looked_at?.length ? [["looked at", `${result.looked_at.length} designs over the whole range`]] : []),
       ]),
-      button, limitsOf(result), basinsOf(result, use), conditionsOf(result),
+      take, limitsOf(result), basinsOf(result, use), conditionsOf(result),
     );
     if (values.length) tell("optimum", { values: Object.fromEntries(values), peak: result.peak });
+    return undefined;
   },
   // Of a search that was stopped the best so far is all there is: it stays, and may be loaded.
   failed(text, _issues, job) {
-    say("design-status", text, true);
+    design.say(text, true);
     if (!job?.best) return;
     showBest(job.best);
-    byId("design-best")?.append(el("button", { type: "button", onclick: () => load(job.best.values, job.request) }, "Load the best so far"));
+    byId("design-best")?.append(button("Load the best so far", () => load(job.best.values, job.request)));
   },
-};
+});
 
 // The best design so far, while the search goes on: what it is, how well it is known, and that it may be another in the end.
 let seen = null;
@@ -72,10 +77,9 @@ function showBest(best) {
   const key = JSON.stringify(best);
   if (key === seen && byId("design-best")) return;
   seen = key;
-  const values = Object.entries(best.values).map(([path, v]) => `${path} ${quantity(path, v)}`).join(", ");
-  show(byId("design-facts"), el("div", { id: "design-best", class: "best-so-far", role: "status" },
-    el("p", {}, el("strong", {}, "Best so far"), ` ${values}`, best.peak === null ? "" : `: peak ${length(best.peak)}`, `, after ${best.evaluations} evaluation${best.evaluations === 1 ? "" : "s"}`),
-    el("p", { class: "note" }, el("span", { class: best.verified ? "chip good" : "chip" }, best.verified ? "verified" : "to be verified"),
+  design.facts(el("div", { id: "design-best", class: "best-so-far", role: "status" },
+    el("p", {}, el("strong", {}, "Best so far"), ` ${valuesSaid(best.values)}`, best.peak === null ? "" : `: peak ${length(best.peak)}`, `, after ${best.evaluations} evaluation${best.evaluations === 1 ? "" : "s"}`),
+    note(el("span", { class: best.verified ? "chip good" : "chip" }, best.verified ? "verified" : "to be verified"),
       best.feasible ? null : el("span", { class: "chip bad" }, "breaks a limit"), ` ${best.words}`)));
 }
 
@@ -96,15 +100,95 @@ const heldIn = ({ held_by: held, peaks }) =>
 // Sets the values of a design with those it was computed with: of no other scene, and beside no other values.
 export function load(values, { scene, set = {} }) {
   if (scene !== state.scene) return tell("notice", `This design is of the scene ${scene}, and ${state.scene} is shown: choose ${scene} first.`);
-  const own = { ...set };
-  for (const [names, value] of Object.entries(values)) {
-    for (const path of names.split(",").map((name) => name.trim())) {
-      delete own[path];
-      own[path] = value;
-    }
-  }
-  putAll(own);
-  return undefined;
+  const found = apart(values);
+  // What was found comes last, as if it had been set last.
+  return putAll({ ...Object.fromEntries(Object.entries(set).filter(([path]) => !(path in found))), ...found });
+}
+
+const measured = (value, unit) => (unit === "m" ? length(value) : `${number(value)} ${unit}`);
+
+const several = (rows) => new Set(rows.map((row) => row.case)).size > 1;
+
+// The limits with what is reached and what is left.
+function limitsOf({ rows = [] }) {
+  const limited = rows.filter(({ bound }) => bound !== null && bound !== undefined);
+  if (!limited.length) return null;
+  const of = several(rows);
+  return titled("Limits", scrolledTable("Limits of the design", ["limit", ...(of ? ["case"] : []), ...["reached", "allowed", "left"].map(numeric)],
+    limited.map((row) => [row.what, ...(of ? [row.case] : []), ...[row.value, row.bound, row.bound - row.value].map((value) => numeric(measured(value, row.unit)))])));
+}
+
+// The first-order conditions: which rows and bounds push against one another, and how strongly.
+function conditionsOf({ conditions, rows = [] }) {
+  if (!conditions) return null;
+  const of = several(rows);
+  const all = [
+    ...conditions.rows.map(({ what, case: name, multiplier }) => [of ? `${what} of ${name}` : what, numeric(number(multiplier))]),
+    ...conditions.bounds.map(({ variable, side, multiplier }) => [`${side} bound of ${variable}`, numeric(number(multiplier))]),
+  ];
+  return details("What holds it, and how strongly",
+    note(`The multipliers of the first-order (Karush-Kuhn-Tucker) conditions; what is left of them is ${number(conditions.residual, 2)}.`),
+    scrolledTable("Multipliers of the design", ["active", numeric("multiplier")], all));
+}
+
+// Every local optimum that was found, each to be loaded.
+function basinsOf({ basins = [] }, use) {
+  if (basins.length < 2) return null;
+  return titled("Local optima", scrolledTable("Local optima", ["design", numeric("peak"), "keeps the limits", ""],
+    basins.map(({ values, peak, feasible }) => [valuesSaid(values), numeric(length(peak)), feasible === false ? "no" : "yes",
+      button("Load", () => use(values), { "aria-label": `Load the local optimum ${valuesSaid(values)}` })])));
+}
+
+// A design in spite of what is not known, beside the best of what is.
+function robustOf(result) {
+  const side = (name, { values, peak, worst, samples }) => [name, valuesSaid(values),
+    ...[peak?.value, worst?.peak, samples?.mean].map((value) => numeric(length(value ?? null))), worst?.scenario?.words ?? "–"];
+  return [
+    facts([["what is minimised", result.aim], ["designs and responses", `${result.designs} and ${result.responses} in ${seconds(result.seconds)}`],
+      ["gain in the worst case", result.gain === null ? "–" : `${number(100 * result.gain, 3)} %`], ["gap", result.gap === null ? "–" : `${number(100 * result.gap, 2)} % could still be missed`],
+      ...result.warnings.map((text) => ["warning", bad(text)]), ...notes({ notes: result.notes, warnings: result.warnings })]),
+    scrolledTable("Nominal and robust design", ["", "design", ...["peak, all nominal", "worst peak", "mean of samples"].map(numeric), "worst with"],
+      [["robust", result.robust], ["nominal", result.nominal]].filter(([, found]) => found).map(([name, found]) => side(name, found))),
+  ];
+}
+
+// What one per cent more of each parameter does to the design: to its peaks and to its band.
+function startSensitivities() {
+  const ask = previewer("sensitivities", (found, { token: of }) => of === wish && drawSensitivities(found), (error, of) => {
+    if (of === wish) show(byId("design-sensitivities"), note(`Sensitivities: ${error.message}`));
+  });
+  const clear = () => {
+    wish = "";
+    show(byId("design-sensitivities"));
+  };
+  on("scene-left", clear);
+  on("job-begun", (kind) => kind === "design" && clear());
+  on("computed", ({ kind, request, result }) => {
+    if (kind !== "design" || !Object.keys(result.optimum ?? {}).length) return;
+    const body = { kind: "sensitivities", scene: state.scene, set: { ...request.set, ...apart(result.optimum) }, harmonics: request.harmonics ?? 11 };
+    if (result.limit) body.limit = result.limit;
+    wish = JSON.stringify(body);
+    cases = Boolean(request.cases?.length);
+    ask(body, wish);
+  });
+}
+
+// Values by paths of which several that share one are separated by commas, each by its own.
+const apart = (values) => Object.fromEntries(Object.entries(values).flatMap(([names, value]) => names.split(",").map((path) => [path.trim(), value])));
+
+const percent = (share) => numeric(share === null ? "–" : `${share > 0 ? "+" : share < 0 ? "−" : ""}${number(Math.abs(share), 3)} %`);
+
+function drawSensitivities({ peaks, rows, left_out: without, band_hz: band, limit, n_harmonics: kept, status, reached }) {
+  const host = byId("design-sensitivities");
+  if (!reached || !rows.length) return show(host, note(`Sensitivities: ${status}`));
+  const heads = ["parameter", ...["value", ...peaks.map(({ at }) => `peak at ${number(at, 5)} Hz`), "band"].map(numeric)];
+  const lines = rows.map(({ path, value, unit, peaks_percent: each, band_percent: width }) => [path, numeric(`${number(value, 5)} ${unit}`.trim()), ...each.map(percent), percent(width)]);
+  const part = (some, name) => scrolledTable(name, heads, some);
+  const of = [`For one per cent more of a parameter${band === null ? "" : `; the band is measured at ${length(limit)}`}.`, `${kept} harmonics.`,
+    cases ? "Of the scene as it is set, without the load cases." : ""].filter(Boolean).join(" ");
+  return show(host, el("h3", {}, "Sensitivities at the design"), note(of), part(lines.slice(0, FIRST), "Sensitivities at the design"),
+    lines.length > FIRST ? details(`${lines.length - FIRST} further parameters, which matter less`, part(lines.slice(FIRST), "Further sensitivities")) : null,
+    without.map(({ path, reason }) => note(`Left out: ${path}: ${reason}`)));
 }
 
 async function plan() {
@@ -123,10 +207,10 @@ function describe({ effects, unknowns, linear_dofs: dofs, estimated_seconds_a_po
     el("li", { class: used ? "used" : "left" },
       el("span", { class: "sign", "aria-hidden": "true" }, used ? "✓" : "–"),
       el("strong", {}, name), ` ${used ? "in use" : "left out"}: ${reason}`,
-      others.length ? el("details", {}, el("summary", {}, `and ${others.length} further sector${others.length > 1 ? "s" : ""}`), others.map((each) => el("p", {}, each))) : null);
+      others.length ? details(`and ${others.length} further sector${others.length > 1 ? "s" : ""}`, others.map((each) => el("p", {}, each))) : null);
   show(
     byId("plan-facts"),
-    el("p", { class: "note" }, `${unknowns} unknowns for ${dofs} linear DOFs; about ${seconds(cost)} a point.`),
+    note(`${unknowns} unknowns for ${dofs} linear DOFs; about ${seconds(cost)} a point.`),
     el("ul", { class: "effects" }, grouped(effects).sort((a, b) => b.used - a.used).map(item)),
   );
 }

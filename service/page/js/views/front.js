@@ -1,52 +1,38 @@
 // The Pareto front of peak against band; a click loads a design.
 
+import { button, byId, el, numeric, scrolledTable } from "../base/dom.js";
+import { length, lengthUnit, number, seconds, valuesSaid } from "../base/format.js";
 import { chart } from "../charts/chart.js";
+import { OF_THE_BAR } from "../scene/kinds.js";
 import { load } from "./design.js";
-import { byId, el, say, show, table } from "../base/dom.js";
-import { on } from "../base/events.js";
-import { length, lengthUnit, number, quantity, seconds } from "../base/format.js";
+import { view } from "./view.js";
 
 const FAR_APART = 8;
-let plot = null;
 let points = [];
 let request = null;
 let of = null; // what the peaks are of
-
 let chosen = null;
 
-export function startFront() {
-  plot = chart(byId("front-figure"), {
-    label: "Front of peak against band",
-    file: "front",
-    height: 300,
-    onPick: (_point, at) => points[at] && take(at),
-  });
-  on("scene", () => {
+export const front = view({
+  kind: "pareto", id: "front", title: "Peak against band", tabs: "map", priority: 2,
+  form: { words: "Compute the front", hide: OF_THE_BAR, top: ["limit", "points"], groups: [{ legend: "Limits, load cases, method", id: "more" }] },
+  about: "Designs of which none has both a lower peak and a narrower band than another.",
+  work: "front", goes: ({ took, points: count }) => `Front:${took}, ${count} evaluations.`,
+  figure: (host) => chart(host, { label: "Front of peak against band", file: "front", onPick: (_point, at) => points[at] && take(at) }),
+  scene() {
     [points, chosen] = [[], null];
-    plot.clear();
-    say("front-status", "Designs of which none has both a lower peak and a narrower band than another.");
-    show(byId("front-facts"));
-  });
-}
-
-export const frontView = {
-  waiting: () => say("front-status", "The front waits for a worker."),
-  progress: ({ took, points: count }) => say("front-status", `Front:${took}, ${count} evaluations.`),
+  },
   result(result, _sweeps, job) {
     ({ request } = job);
     of = result.measured;
     points = [...result.points].sort((a, b) => a.band_hz - b.band_hz);
-    if (!points.length) return say("front-status", result.status, true);
+    if (!points.length) return front.say(result.status, true);
     chosen = null;
     draw();
     const measured = result.limit === null ? "half power of each peak" : length(result.limit);
-    say("front-status", `${points.length} designs${result.seconds ? ` in ${seconds(result.seconds)}` : ""}, the band at ${measured}. ${result.status}`);
-    return undefined;
+    return front.say(`${points.length} designs${result.seconds ? ` in ${seconds(result.seconds)}` : ""}, the band at ${measured}. ${result.status}`);
   },
-  failed: (text) => say("front-status", text, true),
-};
-
-const words = (p) => Object.entries(p.values).map(([path, v]) => `${path} ${quantity(path, v)}`).join(", ");
+});
 
 // A design of the front becomes that of the scene, and is marked.
 function take(at) {
@@ -62,20 +48,15 @@ function draw() {
   const unit = lengthUnit(Math.max(...peaks));
   const log = Math.max(...peaks) > FAR_APART * Math.min(...peaks);
   const limit = request.limit ?? null;
-  plot.draw({
+  front.plot.draw({
     x: { name: "resonance band [Hz]", pad: 0.06 },
     y: { name: `highest peak, ${of?.name ?? "amplitude"} [${unit.name}]`, unit, log, pad: 0.12 },
     series: [{ name: "front", x: points.map((p) => p.band_hz), y: points.map((p) => p.peak * unit.perMetre), colour: 1, shape: "circle", size: 4.5 }],
     limits: limit !== null && limit >= 0.5 * Math.min(...peaks) && limit <= 2 * Math.max(...peaks) ? [{ y: limit * unit.perMetre, name: "the band is measured here" }] : [],
     marks: chosen === null ? [] : [{ x: points[chosen].band_hz, y: points[chosen].peak * unit.perMetre, shape: "diamond", colour: 2, text: "loaded" }],
-    describe: (x, y, i) => `${words(points[i])}: peak ${number(y)} ${unit.name}, band ${number(x)} Hz. Enter or a click loads it.`,
+    describe: (x, y, i) => `${valuesSaid(points[i].values)}: peak ${number(y)} ${unit.name}, band ${number(x)} Hz. Enter or a click loads it.`,
   });
-  show(
-    byId("front-facts"),
-    el("div", { class: "scroll", role: "region", "aria-label": "Designs of the front", tabindex: 0 },
-      table(["design", { text: "peak", number: true }, { text: "band", number: true }, ""],
-        points.map((p, i) => [el(i === chosen ? "strong" : "span", {}, words(p)), { text: length(p.peak), number: true }, { text: `${number(p.band_hz)} Hz`, number: true },
-          el("button", { type: "button", "aria-label": `Load the design ${words(p)}`, onclick: () => take(i) }, i === chosen ? "Loaded" : "Load")]),
-        "Designs of the front")),
-  );
+  front.facts(scrolledTable("Designs of the front", ["design", numeric("peak"), numeric("band"), ""], points.map(({ values, peak, band_hz: band }, i) => [
+    el(i === chosen ? "strong" : "span", {}, valuesSaid(values)), numeric(length(peak)), numeric(`${number(band)} Hz`),
+    button(i === chosen ? "Loaded" : "Load", () => take(i), { "aria-label": `Load the design ${valuesSaid(values)}` })])));
 }

@@ -1,15 +1,14 @@
-// Sliders of the contact and the force, and the response that follows them.
+// Sliders of the contact and the force, the response that follows them, and earlier ones pinned under it.
 
 import { state, write } from "../base/address.js";
 import { chart } from "../charts/chart.js";
-import { byId, el, show } from "../base/dom.js";
+import { button, byId, el, options, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
 import { length, number, quantity, unitOf } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 import { responseOf, throughPeak } from "../charts/curves.js";
 import { sameValues } from "../scene/inputs.js";
 import { secondsOf, takes } from "../scene/kinds.js";
-import { ghosts, pinned } from "./pins.js";
 import { asked, current, ownValue, sliders as ranges, value, variedParts } from "../scene/scenes.js";
 
 const STEPS = 400;
@@ -29,15 +28,9 @@ let early = null;
 let study = null;
 
 export function startLive() {
-  plot = chart(byId("live-figure"), {
-    label: "Frequency response",
-    file: "response",
-    height: 260,
-    onPick: ({ x }) => tell("point", x),
-  });
+  plot = chart(byId("live-figure"), { label: "Frequency response", file: "response", height: 260, onPick: ({ x }) => tell("point", x) });
   ask = previewer("sweep", drawn, refused);
-  pinned(() => shown());
-  on("pins", redraw);
+  show(byId("pins"), button("Pin this curve", pin, { id: "pin" }), button("Unpin all", unpin, { id: "unpin", hidden: true }));
   on("study-curve", (found) => {
     study = found;
     redraw();
@@ -49,6 +42,7 @@ export function startLive() {
   });
   on("scene", () => {
     latest = null;
+    pinned([]);
     buildSliders();
     if (early?.values !== valuesNow()) refresh();
     else if (early.answer) drawn(...early.answer);
@@ -73,7 +67,7 @@ function sayLate() {
   slow = setTimeout(() => { byId("live-status").textContent = `The response is being computed${takes("sweep") && `, ${takes("sweep")}`} …`; }, SLOW_MS);
 }
 
-export function refresh() {
+function refresh() {
   if (!current.body) return;
   sayLate();
   wish(Math.max(took, secondsOf("sweep")) > LONG && asked().harmonics > COARSE ? COARSE : asked().harmonics);
@@ -94,7 +88,7 @@ function refused(error, token) {
   }
   const words = `Not followed live: ${error.message.replace(/:? submit (it as )?a job$/, "")}. `;
   const large = error.status === 503 || /preview/.test(error.message);
-  show(byId("live-status"), words, large ? el("button", { type: "button", onclick: () => tell("sweep-wanted") }, "Compute it as a job") : null);
+  show(byId("live-status"), words, large ? button("Compute it as a job", () => tell("sweep-wanted")) : null);
 }
 
 // The response of a job as the live one, where that is not followed.
@@ -119,6 +113,30 @@ const lineOf = (answer, look) => {
   const { parameter: x, amplitude: y } = throughPeak(answer);
   return { x, y, ...look };
 };
+
+const MOST_PINS = 4;
+// Earlier responses, each named by the values it had: what a change did is seen beside what was before.
+let pins = [];
+
+function pinned(these) {
+  pins = these;
+  byId("unpin").hidden = pins.length === 0;
+  redraw();
+}
+
+const pin = () => shown() && pinned([...pins, { answer: shown(), name: nameOf(shown()) }].slice(-MOST_PINS));
+
+function unpin() {
+  pinned([]);
+  byId("pin").focus();
+}
+
+const nameOf = ({ peak }) => {
+  const values = Object.entries(state.set).map(([path, value]) => `${path} ${quantity(path, value)}`);
+  return [values.length ? values.slice(-2).join(", ") : "values of the scene", peak ? length(peak.value) : ""].filter(Boolean).join(": ");
+};
+
+const ghosts = () => pins.map(({ answer, name }, i) => ({ name, x: answer.parameter, y: answer.amplitude, colour: [7, 5, 4, 3][i], dash: "dotted", width: 1.6 }));
 
 function redraw() {
   const answer = shown() ?? study?.answer;
@@ -176,19 +194,16 @@ function buildSliders() {
     const node = el("div", { class: "slider" }, el("label", { for: id, title: range.words }, range.text), el("span", { class: "pair" }, box, el("span", {}, unitOf(range.path))), slide);
     return { range, slide, box, node };
   });
-  const reset = el("button", { type: "button", onclick: () => putAll({}) }, "Values of the scene");
-  const chooser = contactChooser();
-  show(byId("sliders"), chooser, sliders.map((each) => each.node), el("div", {}, reset));
+  show(byId("sliders"), contactChooser(), sliders.map((each) => each.node), el("div", {}, button("Values of the scene", () => putAll({}))));
   fillSliders();
 }
 
 function contactChooser() {
   const names = variedParts();
   if (names.length < 2) return null;
-  const choose = el("select", { id: "contact" }, names.map((name) => el("option", { value: name, selected: name === state.contact }, name)));
+  const choose = el("select", { id: "contact" }, options(names, state.contact));
   choose.addEventListener("change", () => {
-    Object.assign(state, { contact: choose.value, variable: "" });
-    state.range = null;
+    Object.assign(state, { contact: choose.value, variable: "", range: null });
     write();
     tell("contact");
     buildSliders();

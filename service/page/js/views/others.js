@@ -2,7 +2,7 @@
 // and the drawings of those that have some.
 
 import { state } from "../base/address.js";
-import { byId, el, facts, say, show, table } from "../base/dom.js";
+import { button, byId, details, el, facts, numeric, options, say, scrolledTable, show, titled } from "../base/dom.js";
 import { on } from "../base/events.js";
 import { saveText } from "../base/exports.js";
 import { number } from "../base/format.js";
@@ -11,26 +11,26 @@ import { chart } from "../charts/chart.js";
 import { schemaForm } from "../forms/form.js";
 import { resume, run } from "../network/jobs.js";
 import { askedFor, kindNames, kindOf, ofTheBar, proposed, refusedFor } from "../scene/kinds.js";
-import { VIEWS } from "../views.js";
-import { DRAWINGS } from "./drawings.js";
+import { hasOwnView, viewOf } from "../views.js";
+import { view } from "./view.js";
 
 const ROWS = 200;
 const forms = new Map();
 
+const others = () => kindNames().filter((name) => !hasOwnView(name));
+
 export function startOthers() {
   byId("others-kind").addEventListener("change", choose);
   on("kinds", () => {
-    const others = kindNames().filter((name) => !(name in VIEWS));
-    byId("others").hidden = !others.length;
-    show(byId("others-kind"), others.map((name) => el("option", { value: name }, name)));
+    byId("others").hidden = !others().length;
+    show(byId("others-kind"), options(others()));
   });
   on("scene", () => {
     say("others-status", "");
     show(byId("others-result"));
     for (const [name, { form }] of forms) form.fill({ ...proposed(name), ...ofTheBar(name) });
-    const known = kindNames().filter((name) => !(name in VIEWS));
-    const asked = known.find((name) => state.jobs[name]);
-    if (known.length) choose();
+    const asked = others().find((name) => state.jobs[name]);
+    if (others().length) choose();
     // Goes on with the job that the address names.
     if (asked) showOther(asked);
   });
@@ -62,26 +62,28 @@ function choose() {
 const plain = (value) => (Array.isArray(value) ? !value.some((one) => typeof one === "object") : typeof value !== "object");
 
 // Any study without a view of its own, by its name.
-const othersView = (name) => ({
-  waiting() {
-    say("others-status", `${name} waits for a worker.`);
-    show(byId("others-result"));
-  },
-  progress: ({ took }) => say("others-status", `${name}:${took}.`),
-  result(result, sweeps) {
-    say("others-status", sweeps.length ? `${name} is done; its sweeps are stored with it.` : `${name} is done.`);
-    const drawings = DRAWINGS[name]?.(result) ?? [];
-    const figures = drawings.map(() => el("div", { class: "figure" }));
-    show(byId("others-result"), ...drawings.map(({ label }, i) => el("div", {}, el("h3", {}, label), figures[i])), facts([...scalars(result), ...notes({ notes: result.notes })]), columns(result),
-      el("button", { type: "button", onclick: () => saveText(JSON.stringify(result, null, 1), `${name}.json`, "application/json") }, "Save as JSON"));
-    // Drawn where they stand: a chart is as wide as its place.
-    drawings.forEach(({ label, file, draw }, i) => chart(figures[i], { label, file, height: 300 }).draw(draw));
-  },
-  failed(words, errors) {
-    say("others-status", words, true);
-    forms.get(name)?.form.complain(errors);
-  },
-});
+const othersView = (name) => {
+  const self = view({ id: "others", goes: ({ took }) => `${name}:${took}.` });
+  return Object.assign(self, {
+    waiting() {
+      self.say(`${name} waits for a worker.`);
+      show(byId("others-result"));
+    },
+    result(result, sweeps) {
+      self.say(sweeps.length ? `${name} is done; its sweeps are stored with it.` : `${name} is done.`);
+      const drawings = viewOf(name)?.drawings(result) ?? [];
+      const figures = drawings.map(() => el("div", { class: "figure" }));
+      show(byId("others-result"), ...drawings.map(({ label }, i) => titled(label, figures[i])), facts([...scalars(result), ...notes({ notes: result.notes })]), columns(result),
+        button("Save as JSON", () => saveText(JSON.stringify(result, null, 1), `${name}.json`, "application/json")));
+      // Drawn where they stand: a chart is as wide as its place.
+      drawings.forEach(({ label, file, draw }, i) => chart(figures[i], { label, file }).draw(draw));
+    },
+    failed(words, errors) {
+      self.say(words, true);
+      forms.get(name)?.form.complain(errors);
+    },
+  });
+};
 
 const worded = (value) => (typeof value === "number" ? number(value, 6) : value === null ? "–" : typeof value === "boolean" ? (value ? "yes" : "no") : String(value));
 
@@ -98,7 +100,6 @@ function columns(result) {
   const longest = Math.max(0, ...lists.map(([, value]) => value.length));
   const same = lists.filter(([, value]) => value.length === longest);
   if (!same.length) return null;
-  const rows = Array.from({ length: Math.min(longest, ROWS) }, (_, i) => same.map(([, value]) => ({ text: worded(value[i]), number: true })));
-  return el("details", {}, el("summary", {}, `Numbers${longest > ROWS ? `, the first ${ROWS}` : ""}`),
-    el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Numbers of the result" }, table(same.map(([name]) => ({ text: name, number: true })), rows, "Numbers")));
+  const rows = Array.from({ length: Math.min(longest, ROWS) }, (_, i) => same.map(([, value]) => numeric(worded(value[i]))));
+  return details(`Numbers${longest > ROWS ? `, the first ${ROWS}` : ""}`, scrolledTable("Numbers of the result", same.map(([name]) => numeric(name)), rows, { caption: "Numbers" }));
 }

@@ -1,14 +1,15 @@
 // One point: loops, a period against the time march, harmonics.
 
 import { state, write } from "../base/address.js";
-import { chart } from "../charts/chart.js";
-import { byId, el, facts, say, show } from "../base/dom.js";
+import { button, byId, el, facts, say, show, titled } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
-import { largest, length, lengthUnit, number, percent } from "../base/format.js";
+import { largest, length, lengthUnit, number, percent, times } from "../base/format.js";
+import { notes } from "../base/words.js";
+import { chart } from "../charts/chart.js";
 import { resume, run } from "../network/jobs.js";
 import { previewer } from "../network/previews.js";
 import { asked, current } from "../scene/scenes.js";
-import { notes } from "../base/words.js";
+import { figurePart, statusPart, view } from "./view.js";
 
 const MARCH_EVERY = 16;
 const MOTIONS = [["stick", "sticks", undefined], ["slip", "slips", "dashed"], ["apart", "open", "dotted"]];
@@ -18,35 +19,44 @@ let march = null;
 let chosen = 0;
 let ask = null;
 
-export function startPoint() {
-  plots = {
-    loops: chart(byId("loops-figure"), { label: "Hysteresis loop", file: "loop", height: 190 }),
-    history: chart(byId("history-figure"), { label: "One period", file: "period", height: 190 }),
-    harmonics: chart(byId("harmonics-figure"), { label: "Amplitude of each harmonic", file: "harmonics", height: 190, legend: false }),
-  };
-  ask = previewer("point", (answer, { token }) => token === wish() && arrived(answer), (error) => say("point-status", error.message, true));
-  byId("point-show").addEventListener("click", () => go(byId("point-at").valueAsNumber));
-  byId("point-at").addEventListener("keydown", (event) => event.key === "Enter" && go(byId("point-at").valueAsNumber));
-  on("point", go);
-  on("peak", (at) => state.at === null && go(at));
-  on("settled", () => state.at !== null && go(state.at));
-  on("scene", () => {
+export const point = view({
+  id: "point", title: "One point", tabs: "response map disk", wide: true,
+  about: "Click on a response or on the map, or enter a frequency.",
+  parts: () => [
+    statusPart("point"),
+    el("div", { class: "row" }, el("label", { for: "point-at" }, "Frequency"), el("input", { type: "number", id: "point-at", step: "any", min: "0" }), el("span", {}, "Hz"),
+      button("Show", typed, { id: "point-show" })),
+    el("div", { class: "thirds" }, titled("Hysteresis loops", figurePart("loops-figure"), el("div", { id: "loops-more" })),
+      titled("One period, with the time march", figurePart("history-figure"), statusPart("march")), titled("Harmonics", figurePart("harmonics-figure"))),
+    el("div", { id: "point-facts" }),
+  ],
+  start() {
+    plots = {
+      loops: chart(byId("loops-figure"), { label: "Hysteresis loop", file: "loop", height: 190 }),
+      history: chart(byId("history-figure"), { label: "One period", file: "period", height: 190 }),
+      harmonics: chart(byId("harmonics-figure"), { label: "Amplitude of each harmonic", file: "harmonics", height: 190, legend: false }),
+    };
+    ask = previewer("point", (answer, { token }) => token === wish() && arrived(answer), (error) => point.say(error.message, true));
+    byId("point-at").addEventListener("keydown", (event) => event.key === "Enter" && typed());
+    on("point", go);
+    on("peak", (at) => state.at === null && go(at));
+    on("settled", () => state.at !== null && go(state.at));
+  },
+  scene() {
     found = march = null;
-    say("point-status", "Click on a response or on the map, or enter a frequency.");
     say("march-status", "");
-    show(byId("point-facts"));
     show(byId("loops-more"));
-    for (const plot of Object.values(plots)) {
-      plot.clear();
-    }
+    for (const plot of Object.values(plots)) plot.clear();
     if (state.at !== null) go(state.at, true);
-  });
-}
+  },
+});
+
+const typed = () => go(byId("point-at").valueAsNumber);
 
 const wish = () => JSON.stringify([state.scene, state.set, state.harmonics, state.at]);
 
 function go(frequency, again = false) {
-  if (!(frequency > 0)) return say("point-status", "The frequency must be a number above 0.", true);
+  if (!(frequency > 0)) return point.say("The frequency must be a number above 0.", true);
   if (state.at !== frequency) again = false;
   state.at = frequency;
   write();
@@ -54,19 +64,18 @@ function go(frequency, again = false) {
   march = null;
   say("march-status", "");
   ask({ kind: "point", ...asked(), frequency_hz: frequency }, wish());
-  if (again && state.jobs.march) resume("march", marchView);
+  if (again && state.jobs.march) resume("march", timeMarch);
   return undefined;
 }
 
 function arrived(answer) {
   found = answer;
-  if (!answer.converged) return say("point-status", answer.status, true);
-  say("point-status", `${number(answer.frequency_hz, 6)} Hz: ${length(answer.max_abs)}, error about ${length(answer.error_estimate)}.`);
+  if (!answer.converged) return point.say(answer.status, true);
+  point.say(`${number(answer.frequency_hz, 6)} Hz: ${length(answer.max_abs)}, error about ${length(answer.error_estimate)}.`);
   const states = answer.period.contacts.map((c) => [c.name, c.shares ? `${c.state}: ${shares(c.shares)}` : c.state]);
-  show(
-    byId("point-facts"),
+  point.facts(
     facts([["max |x|", length(answer.max_abs)], ["half peak to peak", length(answer.half_peak_to_peak)], ["mean", length(answer.mean)], ...states, ...notes(answer)]),
-    el("button", { type: "button", onclick: () => referee() }, "Compare with the time march"),
+    button("Compare with the time march", () => referee()),
   );
   tell("states", { states: Object.fromEntries(answer.period.contacts.map((c) => [c.name, c.state])), at: answer.frequency_hz });
   draw();
@@ -81,7 +90,7 @@ const shares = ({ stick, slip, separation }) =>
 export function referee(priority = 0, tags = []) {
   if (state.at === null) return null;
   const { scene, set } = asked();
-  return run("march", { scene, set, frequency_hz: state.at, history: true, tags }, marchView, priority);
+  return run("march", { scene, set, frequency_hz: state.at, history: true, tags }, timeMarch, priority);
 }
 
 function judged() {
@@ -90,18 +99,18 @@ function judged() {
   say("march-status", `Time march: ${length(march.max_abs)} after ${march.periods} periods${apart}.`);
 }
 
-const marchView = {
-  waiting: () => say("march-status", "The time march waits for a worker."),
-  progress: () => say("march-status", "The time march runs."),
+// Follows the point that is looked at, which begins it.
+export const timeMarch = view({
+  kind: "march", id: "march", tabs: "response", work: "time march", goes: () => "The time march runs.",
   result(result, _sweeps, job) {
     if (Math.abs(job.request.frequency_hz - state.at) > 1e-9 * state.at) return;
     march = result;
     judged();
     if (found?.period) draw();
   },
-  failed: (text) => say("march-status", text, true),
-  gone: () => undefined,
-};
+});
+
+const some = (values) => values.filter((_, i) => i % MARCH_EVERY === 0);
 
 function draw() {
   drawHistory();
@@ -116,10 +125,7 @@ function drawHistory() {
   const line = (x, y) => ({ x: x.map((t) => t * per), y: y.map((v) => v * unit.perMetre) });
   const series = [{ name: "balance", ...line(time, displacement), colour: 1 }];
   const other = march?.history;
-  if (other) {
-    const some = (values) => values.filter((_, i) => i % MARCH_EVERY === 0);
-    series.push({ name: "time march", ...line(some(other.time), some(other.displacement)), colour: 2, width: 0, shape: "circle", size: 3 });
-  }
+  if (other) series.push({ name: "time march", ...line(some(other.time), some(other.displacement)), colour: 2, width: 0, shape: "circle", size: 3 });
   plots.history.draw({
     x: { name: `time [${word}]` },
     y: { name: `${current.body.observe.dof} [${unit.name}]`, unit, pad: 0.06 },
@@ -133,18 +139,16 @@ function drawLoop() {
   chosen = Math.min(chosen, contacts.length - 1);
   const contact = contacts[chosen];
   const unit = lengthUnit(largest(contact.slip));
-  const x = contact.slip.map((v) => v * unit.perMetre);
+  const up = times(unit.perMetre);
+  const x = contact.slip.map(up);
   const pieces = contact.motion
     ? MOTIONS.map(([paint, name, dash], code) => piece(contact, x, code, { paint, name, dash })).filter(Boolean)
     : [{ name: "", x, y: contact.force, colour: 1 }];
   const other = march?.history?.contacts.find((c) => c.name === contact.name);
-  if (other) {
-    const some = (values) => values.filter((_, i) => i % MARCH_EVERY === 0);
-    pieces.push({ name: "time march", x: some(other.slip).map((v) => v * unit.perMetre), y: some(other.force), colour: 7, width: 0, shape: "circle", size: 2.6 });
-  }
+  if (other) pieces.push({ name: "time march", x: some(other.slip).map(up), y: some(other.force), colour: 7, width: 0, shape: "circle", size: 2.6 });
   plots.loops.draw({ x: { name: `slip motion of ${contact.name} [${unit.name}]`, unit, pad: 0.06 }, y: { name: "friction force [N]", pad: 0.06 }, series: pieces });
   const choose = contacts.length > 1
-    ? contacts.map((c, i) => el("button", { type: "button", "aria-pressed": String(i === chosen), onclick: () => { chosen = i; drawLoop(); } }, c.name))
+    ? contacts.map((c, i) => button(c.name, () => { chosen = i; drawLoop(); }, { "aria-pressed": String(i === chosen) }))
     : [];
   show(byId("loops-more"), el("div", { class: "row" }, choose));
 }

@@ -8,50 +8,38 @@ import { run } from "../network/jobs.js";
 import { askedFor, ofTheBar, proposed, refusedFor, takes } from "../scene/kinds.js";
 import { variable } from "../scene/scenes.js";
 import { readSettings } from "../scene/settings.js";
-import { VIEWS } from "../views.js";
+import { STUDIES, viewOf } from "../views.js";
 import { PRESS } from "../workbench/run_list.js";
 import { referee } from "./point.js";
 import { computedFor } from "./renewal.js";
+import { complaining } from "./view.js";
 
-// The most wanted first.
-const PRIORITY = { sweep: 6, design: 5, map: 4, modes: 4, accuracy: 3, campbell: 3, interference: 3, pareto: 2 };
-// What the bar says has no field a second time.
-const OF_THE_BAR = ["parameter", "from", "to", "variables", "scaling", "start"];
-const FORMS = {
-  sweep: { id: "response", words: "Compute the response", hide: [...OF_THE_BAR, "frequency_hz"], fold: "Settings" },
-  map: { id: "map", words: "Draw the map", hide: OF_THE_BAR, fold: "Settings" },
-  pareto: { id: "front", words: "Compute the front", hide: OF_THE_BAR, top: ["limit", "points"], groups: [{ legend: "Limits, load cases, method", id: "more" }] },
-  accuracy: { id: "accuracy", words: "Measure it", fold: "Settings" },
-  campbell: { id: "campbell", words: "Draw the diagram", fold: "Settings" },
-  interference: { id: "interference", words: "Show", top: ["speed_rpm", "within"], groups: [{ legend: "Orders, families, frequencies", id: "more" }] },
-  modes: { id: "modes", words: "Follow the mode", primary: true, top: ["mode", "from", "to", "nodal_diameter", "aero_damping", "exact_peaks"], groups: [{ legend: "Loops, peaks, disturbances, phase resonance", id: "more" }] },
-};
-// Where a view is about one study, the button of the bar is that of its form.
-const OF_TAB = { design: ["problem-form", "Search this design", "design"], identify: ["identify-form", "Identify", "identify"], modes: ["modes-form", "Follow the mode", "modes"] };
-const WITHOUT_VARIABLE = ["identify", "modes"];
-const OF_THE_BUTTON = ["map", "accuracy", "campbell", "interference"];
+// Where a tab is about one study, the button of the bar is that of its form.
+const ofTab = () => STUDIES.find(({ bar, tabs }) => bar && tabs === state.tab);
+const pressed = () => STUDIES.filter((view) => view.pressed && !refusedFor(view.kind)).map(({ kind }) => kind);
 // How long all that one press begins takes, about.
-export const pressTakes = () => takes("sweep", "design", "pareto", ...OF_THE_BUTTON.filter((kind) => !refusedFor(kind)));
+export const pressTakes = () => takes("sweep", "design", "pareto", ...pressed());
 const forms = new Map();
 let studies = 0;
 // The amplitude [m] at which the band of the best design was measured.
 let bandAt = null;
 
 export function startStudy() {
-  for (const [kind, { id, hide = [], ...how }] of Object.entries(FORMS)) {
-    const submit = (body) => ask(kind, body);
-    forms.set(kind, schemaForm(byId(`${id}-form`), kind, { id, submit, keys: (key) => !hide.includes(key), ...how }));
+  for (const { kind, id, form } of STUDIES.filter((view) => view.form)) {
+    const { hide = [], ...how } = form;
+    forms.set(kind, schemaForm(byId(`${id}-form`), kind, { id, submit: (body) => ask(kind, body), keys: (key) => !hide.includes(key), ...how }));
   }
-  byId("study").addEventListener("click", () => (OF_TAB[state.tab] ? byId(OF_TAB[state.tab][0]).requestSubmit() : study()));
+  byId("study").addEventListener("click", () => (ofTab() ? byId(ofTab().bar.form).requestSubmit() : study()));
   const named = () => {
-    byId("study").textContent = OF_TAB[state.tab]?.[1] ?? "Find the best damper";
-    byId("study").title = OF_TAB[state.tab] ? takes(OF_TAB[state.tab][2]) : pressTakes();
-    byId("study").disabled = !variable() && !WITHOUT_VARIABLE.includes(state.tab);
+    const here = ofTab();
+    byId("study").textContent = here?.bar.words ?? "Find the best damper";
+    byId("study").title = here ? takes(here.kind) : pressTakes();
+    byId("study").disabled = !variable() && !here?.bar.free;
   };
   for (const event of ["tab-shown", "scene", "scene-contact"]) on(event, named);
   // What a study takes is said beside its button, by the plan of the scene.
   on("cost", () => {
-    for (const [kind, { id }] of Object.entries(FORMS)) byId(`${id}-takes`).textContent = takes(kind);
+    for (const kind of forms.keys()) byId(`${viewOf(kind).id}-takes`).textContent = takes(kind);
     named();
   });
   on("renew", renew);
@@ -71,7 +59,7 @@ export function startStudy() {
 
 // What is being typed is not taken away by a study that ends meanwhile.
 function fill(kind, body) {
-  if (forms.has(kind) && !byId(`${FORMS[kind].id}-form`).contains(document.activeElement)) forms.get(kind).fill(body);
+  if (forms.has(kind) && !byId(`${viewOf(kind).id}-form`).contains(document.activeElement)) forms.get(kind).fill(body);
 }
 
 // A problem of several variables is not what the bar says: it stays what it was.
@@ -87,14 +75,8 @@ function bodyOf(kind) {
   return wrong.length ? null : { ...askedFor(kind), ...ofTheBar(kind), ...body };
 }
 
-function begin(kind, body = bodyOf(kind)) {
-  if (!body) return Promise.resolve(false);
-  const view = { ...VIEWS[kind], failed(words, errors = [], job) {
-    VIEWS[kind].failed(words, errors, job);
-    forms.get(kind)?.complain(errors);
-  } };
-  return run(kind, body, view, PRIORITY[kind]);
-}
+const begin = (kind, body = bodyOf(kind)) =>
+  (body ? run(kind, body, complaining(viewOf(kind), forms.get(kind)), viewOf(kind).priority) : Promise.resolve(false));
 
 const withTags = (body, tags) => body && { ...body, tags };
 
@@ -113,7 +95,7 @@ function study() {
   const all = [
     tagged("sweep").then(async (done) => done && (await referee(5, tags))),
     designed,
-    ...OF_THE_BUTTON.filter((kind) => !refusedFor(kind)).map(tagged),
+    ...pressed().map(tagged),
     frontAfter(designed, mine, tags),
   ];
   say("study-status", `${all.length} jobs are under way.`);
@@ -128,7 +110,7 @@ function study() {
 // The front after the best design, which tells a fixed amplitude for the band: at half power of each peak, the
 // highest peaks would have the narrowest bands, and the front would praise designs that damp nothing.
 async function frontAfter(designed, mine, tags) {
-  say("front-status", "The front waits for the best design: its band is measured at half power of that peak.");
+  viewOf("pareto").say("The front waits for the best design: its band is measured at half power of that peak.");
   await designed;
   const body = mine === studies && withTags(bodyOf("pareto"), tags);
   return body && begin("pareto", bandAt === null ? body : { ...body, limit: bandAt });

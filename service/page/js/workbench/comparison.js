@@ -1,8 +1,8 @@
 // Two runs: their responses over one another, then the quantities that differ, each in one unit, with the difference.
 
-import { request } from "../network/api.js";
+import { orNotice, request } from "../network/api.js";
 import { chart } from "../charts/chart.js";
-import { byId, el, show, table } from "../base/dom.js";
+import { byId, details, note, numeric, scrolledTable, show } from "../base/dom.js";
 import { tell } from "../base/events.js";
 import { lengthUnit, number, unitOf, when } from "../base/format.js";
 import { kindOf } from "../scene/kinds.js";
@@ -28,9 +28,9 @@ export function startComparison() {
   });
 }
 
-export async function compareRuns(a, b) {
+export function compareRuns(a, b) {
   const mine = (asked += 1);
-  try {
+  return orNotice(async () => {
     const [found, ...summaries] = await Promise.all([
       request(`/v1/runs/compare?a=${encodeURIComponent(a)}&b=${encodeURIComponent(b)}`), ...[a, b].map((id) => request(`/v1/runs/${id}/summary?points=${POINTS}`)),
     ]);
@@ -40,9 +40,7 @@ export async function compareRuns(a, b) {
     show(byId("runs-compare-body"), differences(found, summaries));
     byId("runs-compare").scrollIntoView({ block: "nearest" });
     byId("runs-compare-title").focus();
-  } catch (error) {
-    tell("notice", error.message);
-  }
+  });
 }
 
 // Two with the same name are told apart by their values, or by when they were handed in.
@@ -98,14 +96,14 @@ function differences(found, summaries) {
   const differing = all.filter((each) => !isEqual(each) && (same || !each.scene));
   const equal = all.filter((each) => isEqual(each) && each.a !== null);
   const ofScenes = same ? [] : all.filter((each) => each.scene && !isEqual(each));
-  const heads = ["quantity", ...headings([a, b], summaries).map((text) => ({ text, number: true })), { text: "difference", number: true }];
-  const part = (label, list) => el("div", { class: "scroll", role: "region", "aria-label": label, tabindex: 0 }, table(heads, list.map(row), label));
+  const heads = ["quantity", ...[...headings([a, b], summaries), "difference"].map(numeric)];
+  const part = (label, list) => scrolledTable(label, heads, list.map(row));
   return [
-    same ? null : el("p", { class: "note" }, `The scenes are different ones: ${a.scene ?? "none"} and ${b.scene ?? "none"}.`),
-    differing.length ? part("Differences of two runs", differing) : el("p", { class: "note" }, "Nothing differs: both computed the same."),
-    further ? el("p", { class: "note" }, `${further} further inputs differ.`) : null,
-    ofScenes.length ? el("details", {}, el("summary", {}, `${ofScenes.length} values of the scenes`), part("Values of two scenes", ofScenes)) : null,
-    equal.length ? el("details", {}, el("summary", {}, `${equal.length} of ${all.length} quantities are equal`), part("Equal quantities of two runs", equal)) : null,
+    same ? null : note(`The scenes are different ones: ${a.scene ?? "none"} and ${b.scene ?? "none"}.`),
+    differing.length ? part("Differences of two runs", differing) : note("Nothing differs: both computed the same."),
+    further ? note(`${further} further inputs differ.`) : null,
+    ofScenes.length ? details(`${ofScenes.length} values of the scenes`, part("Values of two scenes", ofScenes)) : null,
+    equal.length ? details(`${equal.length} of ${all.length} quantities are equal`, part("Equal quantities of two runs", equal)) : null,
   ];
 }
 
@@ -116,7 +114,7 @@ const isNumber = (value) => typeof value === "number";
 function row({ name, unit, a, b }) {
   const { name: told, perMetre } = unit === "m" ? lengthUnit(Math.max(...[a, b].filter(isNumber).map(Math.abs), 0)) : { name: unit, perMetre: 1 };
   const said = (value) => (isNumber(value) ? `${number(value * perMetre, 5)} ${told}`.trim() : words(value));
-  return [name, ...[a, b].map((value) => ({ text: said(value), title: typeof value === "string" ? value : undefined, number: true })), { text: isNumber(a) && isNumber(b) ? change(a * perMetre, b * perMetre, told) : "", number: true }];
+  return [name, ...[a, b].map((value) => ({ text: said(value), title: typeof value === "string" ? value : undefined, number: true })), numeric(isNumber(a) && isNumber(b) ? change(a * perMetre, b * perMetre, told) : "")];
 }
 
 // The second against the first: as a ratio where it is another size, else in per cent.

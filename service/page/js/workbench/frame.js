@@ -1,9 +1,9 @@
-// The frame of the page: the drawer that holds the rail where there is no room for it, the menus of the bar, and the
-// chips of values that differ from the scene.
+// The frame of the page: the drawer that holds the rail where there is no room for it, the menus of the bar, the chips of
+// values that differ from the scene; light or dark.
 
 import { state } from "../base/address.js";
-import { byId, el, show } from "../base/dom.js";
-import { on } from "../base/events.js";
+import { button, byId, el, show } from "../base/dom.js";
+import { on, tell } from "../base/events.js";
 import { quantity } from "../base/format.js";
 import { ownValue, variable } from "../scene/scenes.js";
 import { putAll } from "../views/live.js";
@@ -58,7 +58,7 @@ function drawChips() {
     return el("li", { class: "set-chip" },
       el("b", {}, `${path} = ${quantity(path, value)}`),
       scene === null ? null : ` (scene: ${quantity(path, scene)})`,
-      el("button", { type: "button", "aria-label": `Put ${path} back to the value of the scene`, onclick: () => putBack(path) }, "×"));
+      button("×", () => putBack(path), { "aria-label": `Put ${path} back to the value of the scene` }));
   }));
 }
 
@@ -71,4 +71,24 @@ function putBack(path) {
 function sayWhat() {
   const path = variable();
   byId("search-words").textContent = path && state.range ? `${path} ${state.range.join(" – ")} ${byId("variable-unit").textContent}` : "–";
+}
+
+const THEME = "stickslip-theme";
+
+// Light, dark, or as the system has it; kept on this machine.
+export function startTheme() {
+  const choose = byId("theme");
+  choose.value = localStorage.getItem(THEME) ?? "";
+  apply(choose.value);
+  choose.addEventListener("change", () => {
+    if (choose.value) localStorage.setItem(THEME, choose.value);
+    else localStorage.removeItem(THEME);
+    apply(choose.value);
+  });
+}
+
+function apply(theme) {
+  if (theme) document.documentElement.dataset.theme = theme;
+  else delete document.documentElement.dataset.theme;
+  tell("theme", theme);
 }

@@ -1,10 +1,10 @@
-// Projects: the one that is open gathers what is computed from now on, and lists what was.
+// Projects: the one that is open gathers what is computed from now on, and lists what was. What is deleted, of them and of
+// the runs, goes to the bin of the service, and comes back on a click.
 
-import { everyItem, post, request } from "../network/api.js";
+import { everyItem, orNotice, patched, post, request } from "../network/api.js";
 import { state, write } from "../base/address.js";
-import { byId, el, say, show } from "../base/dom.js";
+import { button, byId, el, onSubmit, options, say, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
-import { undoable } from "./undo.js";
 
 let projects = [];
 let editing = null;
@@ -14,15 +14,12 @@ export function startProjects() {
   byId("project-new").addEventListener("click", () => form(null));
   byId("project-edit").addEventListener("click", () => form(opened()));
   byId("project-delete").addEventListener("click", remove);
-  byId("project-form").addEventListener("submit", (event) => {
-    event.preventDefault();
-    save();
-  });
+  onSubmit(byId("project-form"), save);
   byId("project-cancel").addEventListener("click", () => form(undefined));
   on("projects-changed", listProjects);
 }
 
-export const opened = () => projects.find(({ id }) => id === state.project) ?? null;
+const opened = () => projects.find(({ id }) => id === state.project) ?? null;
 
 export const projectsKnown = () => projects;
 
@@ -37,7 +34,7 @@ export async function listProjects() {
 }
 
 function draw() {
-  show(byId("project"), el("option", { value: "" }, "All runs"), projects.map(({ id, name, runs }) => el("option", { value: id }, `${name} (${runs})`)));
+  show(byId("project"), options([["", "All runs"], ...projects.map(({ id, name, runs }) => [id, `${name} (${runs})`])]));
   byId("project").value = state.project;
   const project = opened();
   for (const id of ["project-edit", "project-delete"]) byId(id).hidden = project === null;
@@ -67,9 +64,7 @@ function form(project) {
 async function save() {
   const body = { name: byId("project-name").value.trim(), notes: byId("project-text").value };
   try {
-    const saved = editing
-      ? await request(`/v1/projects/${editing.id}`, { method: "PATCH", body, headers: { "If-Match": `"${editing.revision}"` } })
-      : await post("/v1/projects", body);
+    const saved = editing ? await patched(`/v1/projects/${editing.id}`, editing, body) : await post("/v1/projects", body);
     state.project = saved.id;
     await listProjects();
     choose(saved.id);
@@ -86,3 +81,17 @@ function remove() {
     choose(gone ? "" : id);
   });
 }
+
+// Puts what has an address in the bin and offers to take it out: `after(true)` once it is gone, `after(false)` once it is back.
+export const undoable = (words, path, after) => orNotice(async () => {
+  await request(path, { method: "DELETE" });
+  await after(true);
+  const host = byId("undo");
+  const back = button("Undo", () => orNotice(async () => {
+    await request(`${path}/restore`, { method: "POST" });
+    show(host);
+    await after(false);
+  }));
+  show(host, el("span", {}, words), " ", back);
+  back.focus();
+});

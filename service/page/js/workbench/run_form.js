@@ -1,13 +1,12 @@
 // What is said of a run: name, notes, tags, project; its sweeps; its results as a file; into the bin.
 
-import { request } from "../network/api.js";
-import { el, show } from "../base/dom.js";
+import { patched } from "../network/api.js";
+import { button, el, onSubmit, options, show } from "../base/dom.js";
 import { tell } from "../base/events.js";
 import { saveFrom } from "../base/exports.js";
-import { projectsKnown } from "./projects.js";
+import { projectsKnown, undoable } from "./projects.js";
 import { isUnderWay, PINNED, PRESS } from "./run_list.js";
 import { sweepsOf } from "./sweeps.js";
-import { undoable } from "./undo.js";
 
 // Tags that say something to this page and nothing to people.
 export const isHidden = (tag) => tag.startsWith(PRESS) || tag === PINNED;
@@ -23,20 +22,17 @@ export function runForm(run, title) {
     field("name", "Name", input("name", run.name)), field("notes", "Notes", notes),
     field("tags", "Tags, with commas", input("tags", run.tags.filter((tag) => !isHidden(tag)).join(", "))), field("project", "Project", project), wrong,
     el("div", { class: "row tight" }, el("button", { type: "submit" }, "Save"),
-      el("button", { type: "button", "aria-label": `Results of run ${title} as JSON`, onclick: () => saveFrom(`/v1/jobs/${run.id}/results`, "application/json", `${run.kind}-${run.id}.json`) }, "JSON"),
-      isUnderWay(run) ? null : el("button", { type: "button", "aria-label": `Delete run ${title}`, onclick: () => remove(run, title) }, "Delete")));
-  form.addEventListener("submit", (event) => {
-    event.preventDefault();
-    save(run, form, wrong);
-  });
+      button("JSON", () => saveFrom(`/v1/jobs/${run.id}/results`, "application/json", `${run.kind}-${run.id}.json`), { "aria-label": `Results of run ${title} as JSON` }),
+      isUnderWay(run) ? null : button("Delete", () => remove(run, title), { "aria-label": `Delete run ${title}` })));
+  onSubmit(form, () => save(run, form, wrong));
   return [form, run.sweeps ? sweepsOf(run, title) : null];
 }
 
 // The projects there are; the one it has stays chosen while they are not known yet.
 function offer(select, chosen) {
   const known = projectsKnown();
-  const own = !chosen || known.some(({ id }) => id === chosen) ? [] : [{ id: chosen, name: "its project" }];
-  show(select, el("option", { value: "" }, "none"), [...own, ...known].map(({ id, name }) => el("option", { value: id }, name)));
+  const own = !chosen || known.some(({ id }) => id === chosen) ? [] : [[chosen, "its project"]];
+  show(select, options([["", "none"], ...own, ...known.map(({ id, name }) => [id, name])]));
   select.value = chosen;
 }
 
@@ -47,7 +43,7 @@ async function save(run, form, wrong) {
     tags: [...given.get("tags").split(",").map((tag) => tag.trim()).filter(Boolean), ...run.tags.filter(isHidden)],
   };
   try {
-    await request(`/v1/runs/${run.id}`, { method: "PATCH", body, headers: { "If-Match": `"${run.revision}"` } });
+    await patched(`/v1/runs/${run.id}`, run, body);
     document.activeElement?.blur();
     tell("runs-changed");
     tell("projects-changed");

@@ -1,13 +1,11 @@
 // The rail's runs: what is under way, then the last ones with their figure and response; the table has all of them.
 
-import { request } from "../network/api.js";
+import { orNotice, request } from "../network/api.js";
 import { state } from "../base/address.js";
-import { byId, el, say, show } from "../base/dom.js";
+import { button, byId, el, redrawn, say, svg } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
-import { length, quantity, when } from "../base/format.js";
-import { timing } from "../base/timing.js";
+import { length, quantity, timing, when } from "../base/format.js";
 import { isUnderWay, PINNED, pressOf, runs, summaryOf, titleOf } from "./run_list.js";
-import { sparkline } from "./sparkline.js";
 
 const MOST = 8;
 const MOST_VALUES = 3;
@@ -65,11 +63,7 @@ function draw() {
   // The same list is not drawn anew under the focus or a press; only how far things are goes on.
   if (now === seen) return busy.forEach(progressed);
   seen = now;
-  const host = byId("runs-list");
-  const focused = host.contains(document.activeElement) ? document.activeElement.dataset.focus : null;
-  show(host, shown.map(line));
-  if (focused) host.querySelector(`[data-focus="${focused}"]`)?.focus();
-  return undefined;
+  return redrawn(byId("runs-list"), shown.map(line));
 }
 
 function progressed(run) {
@@ -84,8 +78,8 @@ function line(run) {
   const open = state.jobs[run.kind] === run.id;
   const words = [peakOf(run), ...valuesOf(run, 1), WORDS[run.status] ?? ""].filter(Boolean).join(" · ");
   return el("li", { class: open ? "run is-shown" : "run", "data-run": run.id },
-    el("button", { type: "button", class: "run-name", "data-focus": `open-${run.id}`, "aria-current": open ? "true" : undefined, title: when(run.created), onclick: () => openRun(run) },
-      el("span", {}, el("b", {}, title), isUnderWay(run) ? "" : el("span", { class: "run-what" }, words)), sparkline(summaryOf(run)?.curve)),
+    button([el("span", {}, el("b", {}, title), isUnderWay(run) ? "" : el("span", { class: "run-what" }, words)), sparkline(summaryOf(run)?.curve)], () => openRun(run),
+      { class: "run-name", "data-focus": `open-${run.id}`, "aria-current": open ? "true" : undefined, title: when(run.created) }),
     isUnderWay(run) ? underWay(run, title) : null);
 }
 
@@ -93,29 +87,28 @@ export const underWay = (run, title) =>
   el("div", { class: "row tight" },
     el("progress", { class: "bar", max: 1, value: run.progress, "aria-label": `Progress of run ${title}` }),
     el("span", { class: "run-what run-time" }, `${WORDS[run.status]}${timing(run)}`),
-    el("button", { type: "button", "data-focus": `stop-${run.id}`, "aria-label": `Stop run ${title}`, onclick: () => stop(run.id) }, "Stop"));
-
-async function stop(id) {
-  try {
-    await request(`/v1/jobs/${id}`, { method: "DELETE" });
-  } catch (error) {
-    tell("notice", error.message);
-  }
-}
+    button("Stop", () => orNotice(() => request(`/v1/jobs/${run.id}`, { method: "DELETE" })), { "data-focus": `stop-${run.id}`, "aria-label": `Stop run ${title}` }));
 
 // What was asked is needed to show it; a run from the command may bring a scene of its own.
-export async function openRun(run) {
-  try {
-    const asked = summaryOf(run)?.request ?? (await request(`/v1/runs/${run.id}`)).request;
-    tell("open-run", { ...run, request: asked });
-  } catch (error) {
-    tell("notice", error.message);
-  }
-}
+export const openRun = (run) => orNotice(async () => {
+  const asked = summaryOf(run)?.request ?? (await request(`/v1/runs/${run.id}`)).request;
+  tell("open-run", { ...run, request: asked });
+});
 
 // A job that ends while nobody looks is told by the browser, if it may.
 function ended(run) {
   if (!document.hidden || window.Notification?.permission !== "granted") return;
   const note = new Notification(`${titleOf(run)}: ${run.status === "successful" ? "done" : WORDS[run.status]}`);
   note.onclick = () => { window.focus(); openRun(run); };
+}
+
+const [WIDE, HIGH] = [84, 22];
+
+// A response as a line of a few pixels.
+export function sparkline(curve) {
+  if (!curve?.amplitude.length) return "";
+  const { frequency_hz: x, amplitude: y } = curve;
+  const [first, last, top] = [x[0], x[x.length - 1], Math.max(...y)];
+  const at = x.map((hertz, i) => `${((WIDE * (hertz - first)) / (last - first || 1)).toFixed(1)} ${(HIGH - 2 - ((HIGH - 4) * y[i]) / (top || 1)).toFixed(1)}`);
+  return svg("svg", { class: "spark", viewBox: `0 0 ${WIDE} ${HIGH}`, width: WIDE, height: HIGH, "aria-hidden": "true" }, svg("path", { class: "series c1", d: `M${at.join("L")}` }));
 }

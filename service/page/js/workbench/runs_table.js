@@ -1,16 +1,15 @@
 // The table of runs: sorted by any column, filtered by words and figures, those of one press folded under it.
 
-import { request } from "../network/api.js";
+import { orNotice, patched } from "../network/api.js";
 import { state, write } from "../base/address.js";
-import { byId, el, say, show } from "../base/dom.js";
+import { bad, button, byId, el, note, options, redrawn, say, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
 import { csvText, saveText } from "../base/exports.js";
 import { METRES, number, when } from "../base/format.js";
 import { compareRuns } from "./comparison.js";
 import { isHidden, runForm } from "./run_form.js";
 import { hasMore, isUnderWay, listRuns, PINNED, runs, summaryOf, titleOf } from "./run_list.js";
-import { isPinned, openRun, peakOf, presses, underWay, valuesOf, WORDS } from "./runs.js";
-import { sparkline } from "./sparkline.js";
+import { isPinned, openRun, peakOf, presses, sparkline, underWay, valuesOf, WORDS } from "./runs.js";
 
 // What a row is sorted by; empty figures come last whichever way.
 const COLUMNS = [
@@ -29,7 +28,7 @@ let seen = "";
 
 export function startRunsTable() {
   byId("runs-form").addEventListener("submit", (event) => event.preventDefault());
-  for (const id of ["runs-text", "runs-kind", "runs-fold"]) byId(id).addEventListener("input", () => draw());
+  for (const id of ["runs-text", "runs-kind", "runs-fold"]) byId(id).addEventListener("input", draw);
   byId("runs-since").addEventListener("change", () => tell("runs-since"));
   byId("runs-more").addEventListener("click", () => listRuns(true));
   byId("runs-csv").addEventListener("click", saveTable);
@@ -39,9 +38,7 @@ export function startRunsTable() {
   });
   notifiable();
   for (const event of ["runs", "computed", "scene"]) on(event, draw);
-  on("comparison-closed", () => {
-    choose([]);
-  });
+  on("comparison-closed", () => choose([]));
   on("kinds", () => state.compare.length === 2 && compareRuns(...state.compare));
 }
 
@@ -93,8 +90,7 @@ function draw() {
   const all = rows();
   const kinds = [...new Set(runs().map(({ kind }) => kind))].sort();
   if (byId("runs-kind").options.length !== kinds.length + 1) {
-    const before = byId("runs-kind").value;
-    show(byId("runs-kind"), el("option", { value: "" }, "all kinds"), kinds.map((kind) => el("option", { value: kind, selected: kind === before }, kind)));
+    show(byId("runs-kind"), options([["", "all kinds"], ...kinds], byId("runs-kind").value));
   }
   byId("runs-more").hidden = !hasMore();
   const count = runs().length;
@@ -103,33 +99,38 @@ function draw() {
   // What is being typed in stays; the same table is not drawn anew under the focus.
   if (now === seen || host.querySelector("form")?.contains(document.activeElement)) return;
   seen = now;
-  const focused = host.contains(document.activeElement) ? document.activeElement.dataset.focus : null;
-  show(host, all.length ? el("table", {}, el("caption", { class: "unseen" }, "Runs"), el("thead", {}, heads()), el("tbody", {}, all.flatMap(row)))
-    : el("p", { class: "note" }, count ? "No run meets this." : "No run yet: Find the best damper makes the first ones."));
-  if (focused) host.querySelector(`[data-focus="${focused}"]`)?.focus();
+  redrawn(host, all.length ? el("table", {}, el("caption", { class: "unseen" }, "Runs"), el("thead", {}, heads()), el("tbody", {}, all.flatMap(row)))
+    : note(count ? "No run meets this." : "No run yet: Find the best damper makes the first ones."));
 }
 
 function heads() {
-  const head = ([key, words, of]) => el("th", { scope: "col", class: NUMBERS.includes(key) ? "number" : undefined, "aria-sort": sort.key === key ? (sort.down ? "descending" : "ascending") : of ? "none" : undefined },
-    of ? el("button", { type: "button", class: "sort", "data-focus": `sort-${key}`, onclick: () => { sort = { key, down: sort.key === key ? !sort.down : key === "created" }; draw(); } }, words, sort.key === key ? (sort.down ? " ▼" : " ▲") : "") : words);
-  return el("tr", {}, el("th", { scope: "col" }, el("span", { class: "unseen" }, "Compare")), el("th", { scope: "col" }, el("span", { class: "unseen" }, "Pin")), COLUMNS.map(head), el("th", { scope: "col" }, el("span", { class: "unseen" }, "More")));
+  const column = (content, more = {}) => el("th", { scope: "col", ...more }, content);
+  const unseen = (words) => column(el("span", { class: "unseen" }, words));
+  const sorted = (key) => { sort = { key, down: sort.key === key ? !sort.down : key === "created" }; draw(); };
+  const head = ([key, words, of]) => column(
+    of ? button([words, sort.key === key ? (sort.down ? " ▼" : " ▲") : ""], () => sorted(key), { class: "sort", "data-focus": `sort-${key}` }) : words,
+    { class: NUMBERS.includes(key) ? "number" : undefined, "aria-sort": sort.key === key ? (sort.down ? "descending" : "ascending") : of ? "none" : undefined },
+  );
+  return el("tr", {}, unseen("Compare"), unseen("Pin"), COLUMNS.map(head), unseen("More"));
 }
 
 function row({ run, more, inside }) {
   const title = titleOf(run);
   const shown = state.jobs[run.kind] === run.id;
   const summary = summaryOf(run);
-  const fold = more ? el("button", { type: "button", class: "fold", "data-focus": `fold-${run.id}`, "aria-expanded": String(unfolded.has(run.id)), "aria-label": `${more} more runs of the press of ${title}`, onclick: () => turned(unfolded, run.id) }, unfolded.has(run.id) ? "▾" : "▸") : null;
-  const named = [fold, el("button", { type: "button", class: "run-name", "data-focus": `open-${run.id}`, "aria-current": shown ? "true" : undefined, onclick: () => openRun(run) }, run.name || run.kind), more ? el("span", { class: "note" }, ` and ${more} more`) : null,
+  const unfold = (words, set, name, about, of) => button(words, () => turned(set, run.id), { class: of, "data-focus": `${name}-${run.id}`, "aria-expanded": String(set.has(run.id)), "aria-label": about });
+  const named = [
+    more ? unfold(unfolded.has(run.id) ? "▾" : "▸", unfolded, "fold", `${more} more runs of the press of ${title}`, "fold") : null,
+    button(run.name || run.kind, () => openRun(run), { class: "run-name", "data-focus": `open-${run.id}`, "aria-current": shown ? "true" : undefined }), more ? el("span", { class: "note" }, ` and ${more} more`) : null,
     run.status === "failed" || run.status === "dismissed" ? el("span", { class: "chip bad", title: run.error?.detail }, WORDS[run.status]) : null,
     el("ul", { class: "tags", "aria-label": "Tags" }, run.tags.filter((tag) => !isHidden(tag)).map((tag) => el("li", {}, tag)))];
-  const cells = [run.scene ?? "", run.error?.detail && run.status === "failed" ? el("span", { class: "bad" }, run.error.detail) : valuesOf(run).join(", "), peakOf(run), summary?.band_hz ? number(summary.band_hz) : "", summary?.harmonics ?? "",
+  const cells = [run.scene ?? "", run.error?.detail && run.status === "failed" ? bad(run.error.detail) : valuesOf(run).join(", "), peakOf(run), summary?.band_hz ? number(summary.band_hz) : "", summary?.harmonics ?? "",
     isUnderWay(run) ? underWay(run, title) : sparkline(summary?.curve), when(run.created)];
   const classes = { 2: "number", 3: "number", 4: "number" };
   const line = el("tr", { "data-run": run.id, class: [inside ? "inside" : "", shown ? "is-shown" : ""].join(" ").trim() || undefined },
     el("td", {}, box(run, title)), el("td", {}, pin(run, title)), el("th", { scope: "row" }, named),
     cells.map((cell, i) => el("td", { class: classes[i] }, cell)),
-    el("td", {}, el("button", { type: "button", class: "quiet", "data-focus": `more-${run.id}`, "aria-expanded": String(opened.has(run.id)), "aria-label": `More of run ${title}`, onclick: () => turned(opened, run.id) }, "More")));
+    el("td", {}, unfold("More", opened, "more", `More of run ${title}`, "quiet")));
   return opened.has(run.id) ? [line, el("tr", { "data-more": run.id }, el("td", { colspan: String(COLUMNS.length + 3) }, formOf(run, title)))] : [line];
 }
 
@@ -153,15 +154,11 @@ function box(run, title) {
   return input;
 }
 
-const pin = (run, title) => el("button", { type: "button", class: "pin", "data-focus": `pin-${run.id}`, "aria-pressed": String(isPinned(run)), "aria-label": `Pin run ${title}`, onclick: async () => {
+const pin = (run, title) => button(isPinned(run) ? "★" : "☆", async () => {
   const tags = isPinned(run) ? run.tags.filter((tag) => tag !== PINNED) : [...run.tags, PINNED];
-  try {
-    await request(`/v1/runs/${run.id}`, { method: "PATCH", body: { tags }, headers: { "If-Match": `"${run.revision}"` } });
-  } catch (error) {
-    tell("notice", error.message);
-  }
+  await orNotice(() => patched(`/v1/runs/${run.id}`, run, { tags }));
   tell("runs-changed");
-} }, isPinned(run) ? "★" : "☆");
+}, { class: "pin", "data-focus": `pin-${run.id}`, "aria-pressed": String(isPinned(run)), "aria-label": `Pin run ${title}` });
 
 function saveTable() {
   const all = rows().map(({ run }) => run);

@@ -1,8 +1,7 @@
 // The stored sweeps of a run: what tells them apart, each loaded or taken as a file.
 
-import { request } from "../network/api.js";
-import { el, show, table } from "../base/dom.js";
-import { tell } from "../base/events.js";
+import { orNotice, request } from "../network/api.js";
+import { button, el, note, numeric, scrolledTable, show } from "../base/dom.js";
 import { saveFrom } from "../base/exports.js";
 import { length, number, quantity } from "../base/format.js";
 import { current } from "../scene/scenes.js";
@@ -26,15 +25,14 @@ function told(sweep, all) {
 }
 
 export function sweepsOf(run, title) {
-  const list = el("div", {}, el("p", { class: "note" }, "…"));
+  const list = el("div", {}, note("…"));
   const node = el("details", {}, el("summary", { "aria-label": `Sweeps of run ${title}` }, `Its ${run.sweeps === 1 ? "sweep" : `${run.sweeps} sweeps`}`), list);
   node.addEventListener("toggle", async () => {
     if (!node.open) return;
     try {
       const { items, next } = await request(`/v1/sweeps?of=${run.id}&limit=${MOST}`);
-      const heads = ["over", "values", { text: "peak", number: true }, { text: "at", number: true }, { text: "band [Hz]", number: true }, { text: "points", number: true }, "take"];
-      show(list, el("div", { class: "scroll run-sweeps", role: "region", "aria-label": `Sweeps of ${title}`, tabindex: 0 }, table(heads, items.map((sweep) => row(sweep, items)), `Sweeps of ${title}`)),
-        next ? el("p", { class: "note" }, `The first ${MOST} of ${run.sweeps}.`) : null);
+      const heads = ["over", "values", ...["peak", "at", "band [Hz]", "points"].map(numeric), "take"];
+      show(list, scrolledTable(`Sweeps of ${title}`, heads, items.map((sweep) => row(sweep, items)), { more: "run-sweeps" }), next ? note(`The first ${MOST} of ${run.sweeps}.`) : null);
     } catch (error) {
       show(list, el("p", { class: "bad" }, error.message));
     }
@@ -44,34 +42,29 @@ export function sweepsOf(run, title) {
 
 function row(sweep, all) {
   const name = `${sweep.scene}, ${told(sweep, all) || sweep.parameter}`;
-  const numeric = (text) => ({ text, number: true });
   return [`${sweep.parameter} ${number(sweep.from)} … ${number(sweep.to)}`, told(sweep, all), numeric(sweep.peak ? length(sweep.peak.value) : "no peak"), numeric(sweep.peak ? quantity(sweep.parameter, sweep.peak.at) : ""),
     numeric(sweep.band_hz === null ? "–" : number(sweep.band_hz)), numeric(String(sweep.points)), actions(sweep, name)];
 }
 
 function actions(sweep, name) {
-  const button = (words, act, about = `${words} of ${name}`) => el("button", { type: "button", "aria-label": about, onclick: act }, words);
-  const file = ([words, type, below]) => button(words, () => saveFrom(`/v1/sweeps/${sweep.id}${below}`, type, `sweep-${sweep.id}.${words.toLowerCase()}`));
-  return el("span", { class: "row tight" }, current.body?.name === sweep.scene ? button("Load", () => use(sweep), `Load ${name}`) : null,
-    el("details", {}, el("summary", { "aria-label": `Files of ${name}` }, "Files"), el("span", { class: "row tight" }, FORMS.map(file), button("TOML", () => tomlOf(sweep)))));
+  const take = (words, act, about = `${words} of ${name}`) => button(words, act, { "aria-label": about });
+  const file = ([words, type, below]) => take(words, () => saveFrom(`/v1/sweeps/${sweep.id}${below}`, type, `sweep-${sweep.id}.${words.toLowerCase()}`));
+  return el("span", { class: "row tight" }, current.body?.name === sweep.scene ? take("Load", () => use(sweep), `Load ${name}`) : null,
+    el("details", {}, el("summary", { "aria-label": `Files of ${name}` }, "Files"), el("span", { class: "row tight" }, FORMS.map(file), take("TOML", () => tomlOf(sweep)))));
 }
 
 const withoutSwept = (sweep) => Object.fromEntries(Object.entries(fixedIn(sweep)).filter(([path]) => path !== sweep.parameter));
 
 // The values of a sweep with all that its job had set.
-async function use(sweep) {
-  try {
-    const { request: asked } = await request(`/v1/jobs/${sweep.job}`);
-    load(withoutSwept(sweep), { scene: sweep.scene, set: asked.set });
-  } catch (error) {
-    tell("notice", error.message);
-  }
-}
+const use = (sweep) => orNotice(async () => {
+  const { request: asked } = await request(`/v1/jobs/${sweep.job}`);
+  load(withoutSwept(sweep), { scene: sweep.scene, set: asked.set });
+});
 
 // The scene of a sweep with its values, and the command that computes the same.
-async function tomlOf(sweep) {
+function tomlOf(sweep) {
   const file = `sweep-${sweep.id}.toml`;
-  try {
+  return orNotice(async () => {
     const job = await request(`/v1/jobs/${sweep.job}`);
     if (!["sweep", "design", "pareto"].includes(job.kind) || job.request.cases) {
       throw new Error(`this sweep is of a job of the kind ${job.kind}, which changes more of the scene than these values`);
@@ -80,7 +73,5 @@ async function tomlOf(sweep) {
     const at = sweep.frequency_hz ? ` --frequency ${sweep.frequency_hz}` : "";
     const command = `stickslip sweep ${file} --parameter ${sweep.parameter} --from ${sweep.from} --to ${sweep.to}${at} --harmonics ${sweep.harmonics}`;
     await saveFrom("/v1/scenes/text", "application/toml", file, { method: "POST", body: { scene, set: withoutSwept(sweep), comments: ["A stored sweep of stickslip. The same from the command:", command] } });
-  } catch (error) {
-    tell("notice", `${file}: ${error.message}`);
-  }
+  }, (error) => `${file}: ${error.message}`);
 }

@@ -1,36 +1,37 @@
 // Tabs: which cards are seen together. A card may stand under several; "All" is the whole page under one another.
 
 import { FIRST_TAB, state, step, write } from "../base/address.js";
-import { byId, el, show } from "../base/dom.js";
+import { button, byId, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
+import { TABS, viewOf } from "../views.js";
 
-const TABS = [["response", "Response"], ["map", "Map"], ["design", "Design"], ["disk", "Disk"], ["modes", "Modes"], ["identify", "Identification"], ["accuracy", "Accuracy"], ["runs", "Runs"], ["all", "All"]];
-const OF_KIND = { sweep: "response", march: "response", map: "map", pareto: "map", design: "design", accuracy: "accuracy", campbell: "disk", interference: "disk", modes: "modes", identify: "identify" };
 const MOVES = { ArrowRight: 1, ArrowLeft: -1 };
 
-// The tab that shows what a kind of job found.
-export const tabOf = (kind) => OF_KIND[kind] ?? "runs";
+const isOn = (card, name) => name === "all" || card.dataset.tabs.split(" ").includes(name);
+const cards = () => [...byId("panel").querySelectorAll("[data-tabs]")];
+// Of a tab whose cards are of a folder that was taken out there is none.
+const tabs = () => TABS.filter(([name]) => cards().some((card) => isOn(card, name)));
 
-const known = (name) => TABS.some(([each]) => each === name);
+// The tab that shows what a kind of job found.
+export const tabOf = (kind) => viewOf(kind)?.tabs?.split(" ")[0] ?? "runs";
 
 export function startTabs() {
-  const list = byId("tabs");
-  show(list, TABS.map(([name, words]) =>
-    el("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-controls": "panel", onclick: () => openTab(name) }, words)));
-  list.addEventListener("keydown", (event) => {
-    const at = TABS.findIndex(([name]) => name === state.tab);
-    const next = event.key === "Home" ? 0 : event.key === "End" ? TABS.length - 1 : event.key in MOVES ? (at + MOVES[event.key] + TABS.length) % TABS.length : -1;
+  const names = tabs().map(([name]) => name);
+  show(byId("tabs"), tabs().map(([name, words]) => button(words, () => openTab(name), { role: "tab", id: `tab-${name}`, "aria-controls": "panel" })));
+  byId("tabs").addEventListener("keydown", (event) => {
+    const { length } = names;
+    const next = event.key === "Home" ? 0 : event.key === "End" ? length - 1 : event.key in MOVES ? (names.indexOf(state.tab) + MOVES[event.key] + length) % length : -1;
     if (next < 0) return;
     event.preventDefault();
-    openTab(TABS[next][0]);
-    byId(`tab-${TABS[next][0]}`).focus();
+    openTab(names[next]);
+    byId(`tab-${names[next]}`).focus();
   });
   on("tab", openTab);
   restoreTab();
 }
 
 // The tab of the address as it is now.
-export const restoreTab = () => openTab(known(state.tab) ? state.tab : FIRST_TAB);
+export const restoreTab = () => openTab(byId(`tab-${state.tab}`) ? state.tab : FIRST_TAB);
 
 function openTab(name) {
   if (name !== state.tab) {
@@ -38,14 +39,14 @@ function openTab(name) {
     byId("panel").scrollTop = 0;
   }
   state.tab = name;
-  for (const [each] of TABS) {
-    const tab = byId(`tab-${each}`);
-    tab.setAttribute("aria-selected", String(each === name));
-    tab.tabIndex = each === name ? 0 : -1;
+  for (const tab of byId("tabs").children) {
+    const chosen = tab.id === `tab-${name}`;
+    tab.setAttribute("aria-selected", String(chosen));
+    tab.tabIndex = chosen ? 0 : -1;
   }
   byId("panel").setAttribute("aria-labelledby", `tab-${name}`);
   byId("panel").dataset.view = name;
-  for (const card of byId("panel").querySelectorAll("[data-tabs]")) card.classList.toggle("off", name !== "all" && !card.dataset.tabs.split(" ").includes(name));
+  for (const card of cards()) card.classList.toggle("off", !isOn(card, name));
   tell("tab-shown", name);
   if (state.scene) write();
 }

@@ -1,6 +1,7 @@
 // The sector of a disk from finite elements: the outline of its mesh, its boundaries and its contacts, in two views.
 
-import { el, show, svg } from "../base/dom.js";
+import { el, note, show, svg } from "../base/dom.js";
+import { cross, dot, turning, unit } from "../shape/stage.js";
 
 const WIDE = 560;
 const HIGH = 330;
@@ -11,11 +12,8 @@ const DOT = 2.6;
 const PLATE = 11;
 const SIDEWAYS = 4;
 
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const times = (a, k) => a.map((value) => k * value);
 const plus = (a, b) => a.map((value, i) => value + b[i]);
-const unit = (a) => times(a, 1 / (Math.hypot(...a) || 1));
 
 // Radius, circumference and axis where the sector is: blades stand upright in both views.
 function frameOf(points, axis) {
@@ -36,12 +34,6 @@ const views = ({ along, up, round }) => [
     },
   },
 ];
-
-// A place turned by the pitch about the axis (Rodrigues): where the next sector has it.
-function turned(p, axis, angle) {
-  const k = unit(axis);
-  return plus(plus(times(p, Math.cos(angle)), times(cross(k, p), Math.sin(angle))), times(k, dot(k, p) * (1 - Math.cos(angle))));
-}
 
 // Scale and shift that bring a view into its half of the drawing.
 function fitted(view, points, left, width) {
@@ -66,14 +58,15 @@ const high = ({ x, y }) => svg("rect", { class: "f2", x: (x - DOT).toFixed(1), y
 export function drawSector(host, { body: scene, joints }, look) {
   const { outline, sectors, cyclic } = scene.structure;
   const axis = cyclic?.axis ?? [0, 0, 1];
-  const pitch = (2 * Math.PI) / sectors;
+  // Where the next sector has it: turned by the pitch.
+  const turn = turning(unit(axis), (2 * Math.PI) / sectors);
   const placed = joints.filter(({ at }) => at);
   const words = joints.map((joint) => `${joint.name} ${look.wordsOf(joint)}`).join(", ");
   const drawing = svg("svg", {
     role: "img", viewBox: `0 0 ${WIDE} ${HIGH + 18}`,
     "aria-label": `${scene.name}: one of ${sectors} sectors from finite elements, seen along the axis and from the side; ${outline.low.length} nodes on the boundary to the sector before, ${outline.high.length} on that to the next one; ${words || "no contacts"}`,
   }, look.pattern());
-  const next = outline.points.map((p) => turned(p, axis, pitch));
+  const next = outline.points.map((p) => turn.map((row) => dot(row, p)));
   views(frameOf(outline.points, axis)).forEach((view, i) => {
     const at = fitted(view, i ? outline.points : [...outline.points, ...next], (i * WIDE) / 2, WIDE / 2);
     const places = outline.points.map(at);
@@ -84,7 +77,7 @@ export function drawSector(host, { body: scene, joints }, look) {
     drawing.append(...marks(placed, at, look, i === 1));
     drawing.append(svg("text", { class: "soft", x: (i + 0.5) * (WIDE / 2), y: HIGH + 10, "text-anchor": "middle" }, view.words));
   });
-  show(host, drawing, legend(look, placed.length > 0), note(outline, joints, placed));
+  show(host, drawing, legend(look, placed.length > 0), noted(outline, joints, placed));
 }
 
 // Contacts as plates at their places, named in one view.
@@ -108,11 +101,11 @@ function legend(look, rubbing) {
     entry(svg("path", { class: "mesh next", d: "M1 8H15" }), "the next sector"), rubbing ? look.key() : null);
 }
 
-function note(outline, joints, placed) {
+function noted(outline, joints, placed) {
   const missing = joints.filter((each) => !placed.includes(each)).map(({ name }) => name);
   const said = [
     outline.edges.length ? "" : "The deck tells no elements that can be drawn: the nodes stand for the mesh.",
     missing.length ? `Without a place, so not drawn: ${missing.join(", ")}.` : "",
   ].filter(Boolean);
-  return said.length ? el("p", { class: "note" }, said.join(" ")) : null;
+  return said.length ? note(said.join(" ")) : null;
 }

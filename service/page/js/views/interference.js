@@ -1,40 +1,32 @@
 // The interference diagram of a disk: natural frequencies over the nodal diameter, and the engine orders there.
 
-import { byId, el, say, show, table } from "../base/dom.js";
-import { on } from "../base/events.js";
+import { byId, details, el, note, numeric, scrolledTable } from "../base/dom.js";
 import { number } from "../base/format.js";
 import { chart } from "../charts/chart.js";
 import { refusedFor } from "../scene/kinds.js";
+import { figurePart, formPart, statusPart, view } from "./view.js";
 
 const HEADROOM = 1.05;
 const MOST_NAMED = 40;
 const SHIFT = { forward: 0.07, backward: -0.07 };
-const ABOUT = "Natural frequencies over the nodal diameter, with what the engine orders excite at a speed.";
-let diagram = null;
 
-export function startInterference() {
-  diagram = chart(byId("interference-figure"), { label: "Interference diagram", file: "interference", height: 380 });
-  on("scene", () => {
-    byId("interference").hidden = refusedFor("interference") !== "";
-    diagram.clear();
-    say("interference-status", ABOUT);
-    show(byId("interference-facts"));
-  });
-}
-
-export const interferenceView = {
-  waiting: () => say("interference-status", "The diagram waits for a worker."),
-  progress: ({ took }) => say("interference-status", `Nodal diameters:${took}.`),
+export const interference = view({
+  kind: "interference", id: "interference", title: "Interference diagram", tabs: "disk", wide: true, hidden: true, priority: 3, pressed: true,
+  form: { words: "Show", top: ["speed_rpm", "within"], groups: [{ legend: "Orders, families, frequencies", id: "more" }] },
+  about: "Natural frequencies over the nodal diameter, with what the engine orders excite at a speed.",
+  work: "diagram", goes: ({ took }) => `Nodal diameters:${took}.`,
+  figure: (host) => chart(host, { label: "Interference diagram", file: "interference", height: 380 }),
+  parts: () => [statusPart("interference"), formPart("interference"), figurePart("interference-figure"), el("div", { id: "interference-facts" })],
+  scene: () => { byId("interference").hidden = refusedFor("interference") !== ""; },
   result(found) {
     draw(found);
     const inside = found.crossings.filter((one) => one.inside).length;
     const missing = found.missing.length ? ` The sector was not reduced for the nodal diameters ${found.missing.join(", ")}.` : "";
     const met = found.speed_rpm === null ? "" : ` At ${number(found.speed_rpm, 6)} /min engine orders meet families at ${inside} places and come near them at ${found.crossings.length - inside} more.`;
-    say("interference-status", `${found.sectors} sectors. Friction moves each natural frequency between open and stuck.${met}${missing}`);
-    show(byId("interference-facts"), crossings(found), frequencies(found));
+    interference.say(`${found.sectors} sectors. Friction moves each natural frequency between open and stuck.${met}${missing}`);
+    interference.facts(crossings(found), frequencies(found));
   },
-  failed: (text) => say("interference-status", text, true),
-};
+});
 
 const place = (point) => point.diameter + (SHIFT[point.wave] ?? 0);
 
@@ -55,14 +47,10 @@ function families(points, key) {
 
 // From open to stuck at each nodal diameter: where friction may put the resonance.
 function ranges(points) {
-  const [x, y] = [[], []];
-  for (const point of points) {
-    point.open_hz.forEach((open, i) => {
-      x.push(place(point), place(point), null);
-      y.push(open, point.stuck_hz[i], null);
-    });
-  }
-  return { x, y };
+  return {
+    x: points.flatMap((point) => point.open_hz.flatMap(() => [place(point), place(point), null])),
+    y: points.flatMap(({ open_hz: open, stuck_hz: stuck }) => open.flatMap((hertz, i) => [hertz, stuck[i], null])),
+  };
 }
 
 // The line that the orders lie on, folded at 0 and at half the sectors.
@@ -90,7 +78,7 @@ function draw(found) {
     return { x: mine.map((one) => one.diameter), y: mine.map((one) => one.frequency_hz) };
   };
   const flagged = orders.filter((one) => kind(one) !== "clear");
-  diagram.draw({
+  interference.plot.draw({
     x: { name: "nodal diameter", low: -0.35, high: Math.floor(found.sectors / 2) + 0.35, whole: true },
     y: { name: "frequency [Hz]", low: 0, high: top },
     series: [
@@ -120,28 +108,23 @@ function described(one, found) {
 // Engine orders that meet a family, or are near one.
 function crossings(found) {
   if (found.speed_rpm === null) return null;
-  if (!found.crossings.length) return el("p", { class: "note" }, "No engine order meets a family or is near one.");
+  if (!found.crossings.length) return note("No engine order meets a family or is near one.");
   const rows = found.crossings.map((one) => [
-    { text: String(one.order), number: true },
-    `${one.diameter}${way(one)}`,
-    { text: number(one.frequency_hz, 5), number: true },
-    { text: String(one.family), number: true },
-    { text: `${number(one.open_hz, 5)} – ${number(one.stuck_hz, 5)}`, number: true },
+    numeric(String(one.order)), `${one.diameter}${way(one)}`, numeric(number(one.frequency_hz, 5)), numeric(String(one.family)), numeric(ends(one.open_hz, one.stuck_hz)),
     one.inside ? el("strong", {}, "meets") : `${number(100 * one.margin, 3)} % away`,
   ]);
-  const heads = [{ text: "order", number: true }, "nodal diameter", { text: "at [Hz]", number: true }, { text: "family", number: true }, { text: "open – stuck [Hz]", number: true }, ""];
-  return el("div", { class: "scroll disk-table", role: "region", tabindex: 0, "aria-label": "Engine orders that meet a family" },
-    table(heads, rows, `Engine orders at ${number(found.speed_rpm, 6)} /min that meet a family or are within ${number(100 * found.within)} % of one`));
+  const heads = [numeric("order"), "nodal diameter", ...["at [Hz]", "family", "open – stuck [Hz]"].map(numeric), ""];
+  const caption = `Engine orders at ${number(found.speed_rpm, 6)} /min that meet a family or are within ${number(100 * found.within)} % of one`;
+  return scrolledTable("Engine orders that meet a family", heads, rows, { caption, more: "disk-table" });
 }
 
+const ends = (open, stuck) => `${number(open, 5)} – ${number(stuck, 5)}`;
+
 function frequencies({ diameters }) {
-  const most = Math.max(0, ...diameters.map((point) => point.open_hz.length));
-  const heads = ["nodal diameter", ...Array.from({ length: most }, (_, i) => ({ text: `family ${i + 1}`, number: true }))];
-  const rows = diameters.map((point) => [
-    `${point.diameter}${point.wave === "both" ? "" : way(point)}`,
-    ...Array.from({ length: most }, (_, i) => ({ text: point.open_hz[i] === undefined ? "" : `${number(point.open_hz[i], 5)} – ${number(point.stuck_hz[i], 5)}`, number: true })),
-  ]);
-  return el("details", {}, el("summary", {}, "Natural frequencies [Hz], open – stuck"),
-    el("div", { class: "scroll disk-table", role: "region", tabindex: 0, "aria-label": "Natural frequencies at each nodal diameter" },
-      table(heads, rows, "Natural frequencies [Hz] at each nodal diameter, with all contacts open and stuck")));
+  const each = Array.from({ length: Math.max(0, ...diameters.map((point) => point.open_hz.length)) }, (_, i) => i);
+  const rows = diameters.map(({ diameter, wave, open_hz: open, stuck_hz: stuck }) => [
+    `${diameter}${wave === "both" ? "" : way({ wave })}`, ...each.map((i) => numeric(open[i] === undefined ? "" : ends(open[i], stuck[i])))]);
+  return details("Natural frequencies [Hz], open – stuck",
+    scrolledTable("Natural frequencies at each nodal diameter", ["nodal diameter", ...each.map((i) => numeric(`family ${i + 1}`))], rows,
+      { caption: "Natural frequencies [Hz] at each nodal diameter, with all contacts open and stuck", more: "disk-table" }));
 }

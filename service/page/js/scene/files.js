@@ -1,9 +1,11 @@
-// Files of matrices: sent to the service one by one, each with what it is and what is wrong beside it.
+// Files of matrices: sent to the service one by one, each with what it is and what is wrong beside it; a scene file with
+// those it refers to: all chosen at once, a folder that is dropped, or one after the other.
 
+import { button, byId, el, onFiles, options, show } from "../base/dom.js";
+import { openText } from "../editor/editor.js";
 import { Problem, request, sent } from "../network/api.js";
-import { el, show } from "../base/dom.js";
 
-export const SCENES = /\.(toml|json)$/i;
+const SCENES = /\.(toml|json)$/i;
 const ROLES = { M: "the mass matrix M", K: "the stiffness matrix K", C: "the damping matrix C", mapping: "the names of the rows", nodes: "the deck: places and sets of nodes", diameters: "a reduced sector of a disk", modes: "modes", "": "not used" };
 const LONGEST_NAME = 200;
 
@@ -13,7 +15,7 @@ const plainName = (name) => name.replaceAll(/[^A-Za-z0-9_.\- ]/g, "_").replace(/
 const size = (bytes) => (bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toPrecision(3)} MB`);
 
 // Stores a file, a large one in parts; one that is too large is not sent at all.
-export async function uploaded(file, name, onProgress = () => undefined) {
+async function uploaded(file, name, onProgress = () => undefined) {
   const { most_bytes: most, most_parts: parts } = await request("/v1/matrices/formats");
   if (file.size > most * parts) {
     throw new Error(`It has ${size(file.size)}, the service takes ${size(most * parts)}: raise STICKSLIP_MAX_UPLOAD_BYTES or STICKSLIP_MAX_UPLOAD_PARTS there, or reduce the model first, stickslip import ${file.name} --reduce.`);
@@ -46,7 +48,7 @@ export function matrixFiles(host, changed) {
   async function send(entry) {
     try {
       const found = await uploaded(entry.file, entry.name, (share) => {
-        const words = document.getElementById(`matrix-file-${entry.key}-words`);
+        const words = byId(`matrix-file-${entry.key}-words`);
         if (words) words.textContent = `${Math.round(100 * share)} % is sent, then it is read …`;
       });
       entry.id = found.id;
@@ -65,7 +67,7 @@ export function matrixFiles(host, changed) {
   function draw() {
     const focus = document.activeElement?.id;
     show(host, files.map(row));
-    if (focus) document.getElementById(focus)?.focus();
+    if (focus) byId(focus)?.focus();
   }
 
   function row(entry) {
@@ -73,7 +75,7 @@ export function matrixFiles(host, changed) {
     const several = entry.roles.length > 1;
     const choices = several ? [[entry.roles.join(), `${entry.roles.join(" and ")} in one file`], ["", ROLES[""]]] : Object.entries(ROLES);
     const choose = el("select", { id, disabled: !entry.id, "aria-describedby": `${id}-words` },
-      choices.map(([value, text]) => el("option", { value, selected: value === entry.roles.join() }, text)));
+      options(choices, entry.roles.join()));
     choose.addEventListener("change", () => {
       const roles = choose.value ? choose.value.split(",") : [];
       for (const other of files) if (other !== entry) other.roles = other.roles.filter((role) => !roles.includes(role));
@@ -81,11 +83,11 @@ export function matrixFiles(host, changed) {
       draw();
       changed(false);
     });
-    const drop = el("button", { type: "button", "aria-label": `Leave out ${entry.name}`, onclick: () => {
+    const drop = button("Leave out", () => {
       files = files.filter((other) => other !== entry);
       draw();
       changed(true);
-    } }, "Leave out");
+    }, { "aria-label": `Leave out ${entry.name}` });
     return el("li", { class: entry.error ? "matrix-file wrong" : "matrix-file" },
       el("label", { for: id }, `${entry.name} (${size(entry.file.size)}) is`), choose, drop,
       el("span", { id: `${id}-words`, class: entry.error ? "message" : "note" }, entry.error || entry.words));
@@ -120,4 +122,60 @@ export function matrixFiles(host, changed) {
     first: () => files[0]?.name ?? "",
     broken: () => files.some(({ id }) => !id),
   };
+}
+
+const REFERS = /^\s*(?:M|K|C|G|K_omega2|modes|mapping|diameters|nodes)\s*=\s*"(?!upload:)([^"\n]+)"|[{,]\s*nodes\s*=\s*"(?!upload:)([^"\n]+)"|"(?:M|K|C|G|K_omega2|modes|mapping|diameters|nodes)"\s*:\s*"(?!upload:)([^"\n]+)"/gm;
+
+const ownName = (path) => path.split(/[\\/]/).pop();
+
+// Every file of what was dropped, those in folders too.
+export async function filesOf(transfer) {
+  const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
+  if (!entries.some(({ isDirectory }) => isDirectory)) return [...transfer.files];
+  const inside = async (entry) => {
+    if (entry.isFile) return [await new Promise((resolve, reject) => { entry.file(resolve, reject); })];
+    const reader = entry.createReader();
+    const found = [];
+    for (;;) {
+      const some = await new Promise((resolve, reject) => { reader.readEntries(resolve, reject); });
+      if (!some.length) return (await Promise.all(found.map(inside))).flat();
+      found.push(...some);
+    }
+  };
+  return (await Promise.all(entries.map(inside))).flat();
+}
+
+export const sceneIn = (files) => files.find(({ name }) => SCENES.test(name));
+
+// Opens a scene; what it refers to is stored first, what is not among `files` is asked for.
+export async function openScene(file, files) {
+  const text = await file.text();
+  const wanted = [...new Set([...text.matchAll(REFERS)].map((found) => found.slice(1).find(Boolean)))];
+  const missing = wanted.filter((path) => !files.some(({ name }) => name === ownName(path)));
+  if (missing.length) return ask(missing.map(ownName), (more) => openScene(file, [...files, ...more]));
+  const panel = byId("editor");
+  let whole = text;
+  for (const path of wanted) {
+    panel.hidden = false;
+    show(panel, el("p", { class: "note", role: "status" }, `${ownName(path)} is being sent …`));
+    try {
+      const { id } = await uploaded(files.find(({ name }) => name === ownName(path)), ownName(path), (share) => { panel.firstChild.textContent = `${ownName(path)}: ${Math.round(100 * share)} % is sent …`; });
+      whole = whole.replaceAll(`"${path}"`, `"upload:${id}"`);
+    } catch (error) {
+      return show(panel, el("p", { class: "issues", role: "alert" }, `${ownName(path)}: ${error.message}`), closing(panel));
+    }
+  }
+  return openText(whole, file.name.toLowerCase().endsWith(".json") ? "json" : "toml");
+}
+
+const closing = (panel) => button("Close", () => { panel.hidden = true; });
+
+function ask(names, take) {
+  const panel = byId("editor");
+  const input = el("input", { type: "file", multiple: true, class: "unseen", tabindex: -1, id: "scene-files", "aria-label": "Files that the scene refers to" });
+  onFiles(input, take);
+  panel.hidden = false;
+  show(panel, el("p", { role: "status" }, `The scene refers to ${names.join(" and ")}: choose ${names.length > 1 ? "these" : "it"} too, or drop the folder with all of them.`), input,
+    el("div", { class: "row" }, button("Choose files…", () => input.click(), { class: "main-button" }), closing(panel)));
+  panel.querySelector("button").focus();
 }

@@ -10,9 +10,9 @@ import { run } from "../network/jobs.js";
 import { askedFor } from "../scene/kinds.js";
 import { chooseVariable, defaultRange, variable, variables } from "../scene/scenes.js";
 import { fillSettings, readSettings } from "../scene/settings.js";
-import { VIEWS } from "../views.js";
+import { design } from "./design.js";
+import { complaining, formPart, view } from "./view.js";
 
-const PRIORITY = 5;
 const LEVEL = "excitation.amplitude";
 const GROUPS = [
   { legend: "Load cases: engine orders, levels, bands", id: "cases", keys: ["cases"] },
@@ -23,23 +23,27 @@ const GROUPS = [
 let form = null;
 let uncertain = null;
 
-export function startPanel() {
-  uncertain = uncertainPart("problem");
-  const host = byId("problem-form");
-  form = schemaForm(host, "design", { id: "problem", top: ["variables"], groups: GROUPS, paths: [LEVEL], own: { uncertain }, submit, words: "Search this design", primary: true });
-  for (const event of ["input", "change", "click"]) host.addEventListener(event, () => setTimeout(inWords));
-  on("scene", () => fill({}));
-  on("uncertain-given", (found) => {
-    uncertain.hold(found);
-    byId("problem-uncertainty-fold").open = true;
-    inWords();
-  });
-  on("scene-contact", () => form.rows("variables").count() <= 1 && fillVariables({}));
-  on("settings", () => form.rows("variables").count() <= 1 && fillVariables({}));
-  on("resubmit", (kind) => kind === "design" && host.requestSubmit());
-  // What is being typed is not taken away by a search that ends meanwhile.
-  on("computed", ({ kind, request }) => kind === "design" && !host.contains(document.activeElement) && fill(request));
-}
+export const problem = view({
+  id: "problem", title: "Design problem", tabs: "design",
+  parts: () => [el("p", { id: "problem-words", class: "in-words", role: "status" }), formPart("problem")],
+  clear() {},
+  start() {
+    uncertain = uncertainPart("problem");
+    const host = byId("problem-form");
+    form = schemaForm(host, "design", { id: "problem", top: ["variables"], groups: GROUPS, paths: [LEVEL], own: { uncertain }, submit, words: design.bar.words, primary: true });
+    for (const event of ["input", "change", "click"]) host.addEventListener(event, () => setTimeout(inWords));
+    on("uncertain-given", (found) => {
+      uncertain.hold(found);
+      byId("problem-uncertainty-fold").open = true;
+      inWords();
+    });
+    for (const event of ["scene-contact", "settings"]) on(event, () => form.rows("variables").count() <= 1 && fillVariables({}));
+    on("resubmit", (kind) => kind === "design" && host.requestSubmit());
+    // What is being typed is not taken away by a search that ends meanwhile.
+    on("computed", ({ kind, request }) => kind === "design" && !host.contains(document.activeElement) && fill(request));
+  },
+  scene: () => fill({}),
+});
 
 const ownVariable = () => (variable() ? [{ path: variable(), low: (state.range ?? defaultRange())[0], high: (state.range ?? defaultRange())[1] }] : []);
 
@@ -63,12 +67,8 @@ async function submit(body) {
     fillSettings();
   }
   if (!readSettings()) return;
-  const view = { ...VIEWS.design, failed(words, errors = [], job) {
-    VIEWS.design.failed(words, errors, job);
-    form.complain(errors);
-  } };
   byId("design").scrollIntoView({ block: "nearest" });
-  await run("design", { ...askedFor("design"), ...body }, view, PRIORITY);
+  await run("design", { ...askedFor("design"), ...body }, complaining(design, form), design.priority);
 }
 
 // The problem as a sentence, each phrase of which leads to its fields.
@@ -88,10 +88,15 @@ function inWords() {
     limits.length ? [", ", joined(limits)] : "", open.length ? [", whatever ", joined(open.map((words) => link(words, "uncertain", "uncertainty"))), " is"] : "", ".");
 }
 
+function unitAt(key) {
+  const unit = byId(`problem-${key}`).parentElement.querySelector(".unit");
+  return unit?.value ?? unit?.textContent ?? "";
+}
+
 function limitWords(body) {
   const ranges = (list) => list.map((pair) => pair.join(" – ")).join(", ");
   return Object.entries(body).flatMap(([key, value]) => (
-    key.startsWith("max_") && typeof value === "number" ? [[`${key.slice(4).replace("_hz", "").replaceAll("_", " ")} ≤ ${byId(`problem-${key}`).value} ${byId(`problem-${key}`).parentElement.querySelector(".unit")?.value ?? byId(`problem-${key}`).parentElement.querySelector(".unit")?.textContent ?? ""}`.trim(), key]]
+    key.startsWith("max_") && typeof value === "number" ? [[`${key.slice(4).replace("_hz", "").replaceAll("_", " ")} ≤ ${byId(`problem-${key}`).value} ${unitAt(key)}`.trim(), key]]
       : key === "forbidden_hz" ? [[`clear of ${ranges(value)} Hz`, key]] : key === "speeds_rpm" ? [[`clear of ${ranges(value)} /min`, key]]
         : key === "contact_states" ? [[`${Object.keys(value).join(", ")} never open${Object.keys(value).length > 1 ? "" : "s"}`, key]] : []));
 }
