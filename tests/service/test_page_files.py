@@ -89,7 +89,7 @@ def test_a_module_that_cannot_be_put_with_the_others_is_named(a: str, b: str, wo
 
 
 def test_the_page_has_words_for_every_flag() -> None:
-    text = (FOLDER / "js" / "base" / "words.js").read_text(encoding="utf-8")
+    text = (FOLDER / "js" / "base" / "format.js").read_text(encoding="utf-8")
     told = dict(re.findall(r'^  (\w+): "(.*)",$', text, flags=re.MULTILINE))
     assert told.keys() == FLAGS.keys()
     assert told["not_unique"] == FLAGS["not_unique"]

@@ -1,8 +1,7 @@
 // The page of stickslip: projects, scenes and runs at the left, one scene with its answer and views beside them.
 
-import { asOneStep, lastWritten, read, state, write } from "./base/address.js";
+import { asOneStep, lastWritten, on, read, state, tell, write } from "./base/state.js";
 import { button, byId, dropsOn, el, onFiles, options, show } from "./base/dom.js";
-import { on, tell } from "./base/events.js";
 import { saveToml } from "./base/exports.js";
 import { finishLogin, startNotices } from "./base/notices.js";
 import { edit, editCurrent, newScene } from "./editor/editor.js";
@@ -19,17 +18,15 @@ import { hasOwnView, STUDIES, viewOf, VIEWS } from "./views.js";
 import { startAnswer } from "./views/answer.js";
 import { showResponse, startLive, wishFirst } from "./views/live.js";
 import { showOther, startOthers } from "./views/others.js";
-import { startRenewal } from "./views/renewal.js";
+import { startRenewal, startStudy } from "./views/study.js";
 import { response } from "./views/response.js";
-import { startStudy } from "./views/study.js";
 import { placeCards, startViews } from "./views/view.js";
 import { startComparison } from "./workbench/comparison.js";
-import { startFrame, startTheme } from "./workbench/frame.js";
+import { restoreTab, startFrame, startTabs, startTheme, tabOf } from "./workbench/frame.js";
 import { listProjects, startProjects } from "./workbench/projects.js";
 import { listRuns, startRunList } from "./workbench/run_list.js";
 import { startRuns } from "./workbench/runs.js";
 import { startRunsTable } from "./workbench/runs_table.js";
-import { restoreTab, startTabs, tabOf } from "./workbench/tabs.js";
 
 const FIRST = "bladed-disk";
 const MOST_NAMES = 20;

@@ -2,7 +2,7 @@
 
 import { fetched, orNotice, Problem } from "../network/api.js";
 import { current, variable } from "../scene/scenes.js";
-import { state } from "./address.js";
+import { state } from "./state.js";
 
 const PAINT = ["fill", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "stroke-linecap", "opacity",
   "font-size", "font-family", "font-weight", "paint-order"];

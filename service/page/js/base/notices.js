@@ -2,7 +2,7 @@
 
 import { post, request, setKey } from "../network/api.js";
 import { button, byId, el, onSubmit, say, show } from "./dom.js";
-import { on, tell } from "./events.js";
+import { on, tell } from "./state.js";
 
 const NOTICE_SECONDS = 12;
 const REFUSED = {

@@ -6,9 +6,6 @@ const PAUSE_MS = 220;
 
 // `shown(what)` is told whenever text, tables or issues are others: {from: "text" | "tables" | "scene" | "file"}.
 export function sceneDocument(shown) {
-  let now = { text: "", scene: {} };
-  let issues = [];
-  let unreadable = false;
   let turn = 0;
   let timer = 0;
   let pending = null;
@@ -23,17 +20,16 @@ export function sceneDocument(shown) {
 
   function settle() {
     clearTimeout(timer);
-    if (pending === null) return running;
-    const from = pending;
+    if (pending !== null) running = ask(pending, turn);
     pending = null;
-    running = ask(from, turn);
     return running;
   }
 
   async function ask(from, mine) {
     let found;
     try {
-      found = await post("/v1/scenes/edit", ["tables", "scene"].includes(from) ? { text: now.text, scene: now.scene } : { text: now.text });
+      const { text, scene } = self;
+      found = await post("/v1/scenes/edit", ["tables", "scene"].includes(from) ? { text, scene } : { text });
     } catch (error) {
       if (!(error instanceof Problem || error instanceof Offline)) throw error;
       if (mine === turn) shown({ from, failed: error.message, errors: error.errors ?? [] });
@@ -41,41 +37,37 @@ export function sceneDocument(shown) {
     }
     // What came of an earlier state is of no use: the present one is on its way.
     if (mine !== turn) return;
-    unreadable = found.scene === null;
-    issues = found.issues;
-    now = { text: found.text, scene: found.scene ?? now.scene };
+    const { text, scene, issues } = found;
+    Object.assign(self, { text, scene: scene ?? self.scene, issues, unreadable: scene === null });
     shown({ from });
   }
 
-  return {
-    get text() { return now.text; },
-    get scene() { return now.scene; },
-    get issues() { return issues; },
-    get unreadable() { return unreadable; },
+  const self = {
+    text: "", scene: {}, issues: [], unreadable: false,
     get settled() { return pending === null; },
     // Begins with a text, or with tables of which one is made.
     open({ text = "", scene = null }) {
-      now = { text, scene: scene ?? {} };
-      [issues, unreadable] = [[], false];
+      Object.assign(self, { text, scene: scene ?? {}, issues: [], unreadable: false });
       turn += 1;
       pending = null;
       running = ask(scene ? "scene" : "file", turn);
       return running;
     },
     type(text) {
-      now = { ...now, text };
+      self.text = text;
       later("text");
     },
     change(how) {
-      const scene = structuredClone(now.scene);
+      const scene = structuredClone(self.scene);
       how(scene);
-      now = { ...now, scene };
+      self.scene = scene;
       later("tables");
     },
     settle,
-    blame(found) {
-      issues = found;
+    blame(issues) {
+      self.issues = issues;
       shown({ from: "tables" });
     },
   };
+  return self;
 }

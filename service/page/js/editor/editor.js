@@ -1,18 +1,19 @@
-// The editor of a scene: tables of its parts and its text side by side, what is wrong at the field and at the line.
+// The editor of a scene: tables of its parts and its text side by side, what is wrong at the field and at the line; a scene
+// from nothing: the cases that the service knows, with the few questions of each.
 
-import { button, byId, el, onSubmit, say, show } from "../base/dom.js";
-import { tell } from "../base/events.js";
+import { button, byId, el, note, onSubmit, say, show } from "../base/dom.js";
 import { saveText } from "../base/exports.js";
-import { Problem, post } from "../network/api.js";
+import { tell } from "../base/state.js";
+import { fieldsOf } from "../forms/fields.js";
+import { schemaForm } from "../forms/form.js";
+import { post, Problem, request } from "../network/api.js";
 import { current } from "../scene/scenes.js";
 import { idOf } from "./cells.js";
 import { sceneDocument } from "./document.js";
-import { issueList, markFields } from "./issues.js";
-import { drawTables, forgetOpened, openMissing } from "./tables.js";
 import { tidied } from "./scene_data.js";
 import { loadSchema } from "./schema.js";
+import { drawTables, forgetOpened, openMissing } from "./tables.js";
 import { tomlPane } from "./toml_pane.js";
-import { openChooser } from "./wizard.js";
 
 let doc = null;
 let pane = null;
@@ -210,4 +211,101 @@ async function store() {
     byId("editor").querySelector("[aria-invalid]")?.focus();
   }
   return undefined;
+}
+
+// "/structure/springs/0/k" is "structure › springs 1 › k".
+function placeOf(pointer) {
+  const words = [];
+  for (const part of pointer.split("/").slice(1)) {
+    if (/^\d+$/.test(part) && words.length) words[words.length - 1] += ` ${Number(part) + 1}`;
+    else words.push(part.replaceAll("~1", "/").replaceAll("~0", "~"));
+  }
+  return words.join(" › ") || "scene";
+}
+
+// The field an issue is about: its own, that around it, or the first one in it.
+function fieldOf(fields, pointer) {
+  if (!pointer) return null;
+  const exact = fields.find((node) => node.dataset.pointer === pointer);
+  if (exact?.matches("input, select")) return exact;
+  const around = fields.filter((node) => node.matches("input, select") && pointer.startsWith(`${node.dataset.pointer}/`)).pop();
+  if (around) return around;
+  const inside = fields.find((node) => node.matches("input, select") && node.dataset.pointer.startsWith(`${pointer}/`));
+  return inside ?? exact?.querySelector("input, select") ?? null;
+}
+
+export function markFields(host, issues) {
+  for (const node of host.querySelectorAll(".message")) node.remove();
+  for (const node of host.querySelectorAll("[aria-invalid]")) {
+    node.removeAttribute("aria-invalid");
+    node.removeAttribute("aria-describedby");
+    delete node.dataset.issues;
+  }
+  for (const node of host.querySelectorAll(".wrong")) node.classList.remove("wrong");
+  const fields = [...host.querySelectorAll("[data-pointer]")];
+  for (const { pointer, detail } of issues) {
+    const field = fieldOf(fields, pointer);
+    if (!field) continue;
+    const id = `${field.id}-message`;
+    const before = document.getElementById(id);
+    field.setAttribute("aria-invalid", "true");
+    field.setAttribute("aria-describedby", id);
+    field.dataset.issues = `${field.dataset.issues ?? ""} ${pointer}`.trim();
+    const row = field.closest("tr");
+    (row ?? field.closest(".field"))?.classList.add("wrong");
+    if (before) before.append(` ${detail}`);
+    else if (row) below(row, el("span", { id }, detail));
+    else field.closest(".field")?.append(el("span", { class: "message", id }, detail));
+  }
+}
+
+// A row of words under a row of fields.
+function below(row, words) {
+  const next = row.nextElementSibling;
+  if (next?.classList.contains("message")) next.firstElementChild.append(words);
+  else row.after(el("tr", { class: "message" }, el("td", { colspan: String(row.cells.length) }, words)));
+}
+
+export function issueList(issues, go) {
+  if (!issues.length) return null;
+  return el("ul", { class: "issues issue-list", "aria-label": "What is wrong" }, issues.map((issue) => el("li", {},
+    el("button", { type: "button", class: "link", onclick: () => go(issue) }, `${placeOf(issue.pointer)}${issue.line ? `, line ${issue.line}` : ""}`), ` ${issue.detail}`)));
+}
+
+const EMPTY = "ground-damper";
+let templates = null;
+
+export async function openChooser(panel, { made, close }) {
+  show(panel, el("p", { class: "note", role: "status" }, "The cases are being fetched …"));
+  templates ??= (await request("/v1/templates")).items;
+  const fill = async (template, answers) => made((await post("/v1/templates", { template, answers })).scene);
+  const cards = templates.map(({ name, title, questions }) => card(title, questions.description, () => ask(panel, { name, title, questions, fill, close, back: () => openChooser(panel, { made, close }) })));
+  const empty = card("An empty scene", "One mass on a spring, one contact, one force: rows to begin with in the tables.", () => fill(EMPTY, { name: "new-scene" }));
+  show(panel, el("div", { class: "editor-bar" }, el("h3", {}, "New scene"), button("Close", close)), el("div", { class: "cards" }, empty, cards));
+  panel.querySelector(".cards button").focus();
+  panel.scrollIntoView({ block: "nearest" });
+}
+
+const card = (title, words, onclick) => button([el("strong", {}, title), el("span", {}, words)], onclick, { class: "choice-card" });
+
+function ask(panel, { name, title, questions, fill, close, back }) {
+  // A question is called by its words: its key is known to nobody yet.
+  const fields = fieldsOf(questions).map((field) => {
+    const [label] = field.words.split(/[,;:.[]/);
+    return { ...field, label: label.trim(), words: field.words.slice(label.length).replace(/^[,;:. ]+|\s*\[[^\]]+\]|\.$/g, "") };
+  });
+  const host = el("form", { novalidate: true, id: "wizard-form" });
+  show(panel, el("div", { class: "editor-bar" }, el("h3", {}, title), button("Back", back), button("Close", close)),
+    note(questions.description), host);
+  const form = schemaForm(host, { fields }, { id: "wizard", words: "Make the scene", primary: true, submit: async (answers) => {
+    try {
+      await fill(name, answers);
+    } catch (error) {
+      if (!(error instanceof Problem)) throw error;
+      form.complain((error.errors.length ? error.errors : [{ pointer: "", detail: error.message }]).map((one) => ({ ...one, pointer: one.pointer.replace("/answers", "") })));
+    }
+  } });
+  form.fill(Object.fromEntries(fields.map(({ key, otherwise }) => [key, otherwise])));
+  host.querySelector("input").select();
+  host.querySelector("input").focus();
 }

@@ -1,9 +1,9 @@
 // A form made of the schema of a body: a field for each key, rows for its tables, what is wrong beside it.
 
 import { byId, el, onSubmit, show } from "../base/dom.js";
-import { on } from "../base/events.js";
+import { on } from "../base/state.js";
 import { kindOf } from "../scene/kinds.js";
-import { tablesIn } from "./columns.js";
+import { tablesIn } from "./rows.js";
 import { Unreadable } from "./fields.js";
 import { boxesPart, fieldPart, listPart, namesPart, tablePart } from "./parts.js";
 

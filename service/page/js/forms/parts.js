@@ -3,9 +3,8 @@
 
 import { el, note, options, show } from "../base/dom.js";
 import { lengthUnit, METRES } from "../base/format.js";
-import { boundsTold, listBody, listColumns, listRow, namesOfTable, rowsOfTable, tableBody, tableColumns } from "./columns.js";
+import { boundsTold, listBody, listColumns, listRow, namesOfTable, rowsOf, rowsOfTable, tableBody, tableColumns } from "./rows.js";
 import { hintOf, readField, written } from "./fields.js";
-import { rowsOf } from "./rows.js";
 
 const framed = ({ label, words }, ...content) => el("fieldset", {}, el("legend", { title: words }, label), note(words), content);
 

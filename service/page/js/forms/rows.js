@@ -1,6 +1,10 @@
-// A list of like things as rows of fields under one line of heads: added, removed, read, filled, blamed.
+// A list of like things as rows of fields under one line of heads: added, removed, read, filled, blamed. Tables and lists of
+// a body as such rows: what they offer, and what they say as keys of the body.
 
 import { button, el, options as optionsOf, show } from "../base/dom.js";
+import { number, unitOf } from "../base/format.js";
+import { contactsOf, current, value, variables } from "../scene/scenes.js";
+import { hintOf, numberOf, readField, Unreadable, written } from "./fields.js";
 
 // `columns`: {name, label, type: "number" | "text" | "select" | "now", options, hint, off}; `told(row)` gives what stands
 // in columns of the type "now". `read` gives a table for each row, without empty fields.
@@ -73,3 +77,103 @@ function fieldIn({ name, label, type = "number", options, hint }, value, about) 
 
 // What a problem from elsewhere names stays, also where the page would not offer it.
 const offered = (known, value) => (value === undefined || known.includes(value) ? known : [...known, value]);
+
+// Names of contacts, or paths; what is designed comes before what is merely set.
+export function namesOfTable(key) {
+  if (key === "contact_states") return contactsOf();
+  if (key === "variables") return variables();
+  return [...new Set([...variables(), ...[...current.parameters.values()].filter(({ slider }) => slider).map(({ path }) => path)])];
+}
+
+// What a row says of its path; a path that was chosen anew brings bounds.
+export function boundsTold(key, path, changed) {
+  const known = current.parameters.get(path);
+  const now = { now: known ? number(value(path), 5) : "", unit: unitOf(path) };
+  const bounds = known && changed === "path" ? (key === "variables" ? known.bounds : known.around ?? known.bounds) : null;
+  return bounds ? { ...now, low: String(bounds[0]), high: String(bounds[1]) } : now;
+}
+
+const PAIR = /\[([^\],]+), ([^\],]+)\]/;
+
+// The columns of a pair, named as the words of its key name its ends.
+const ends = (field, before = "") => {
+  const [, low, high] = PAIR.exec(field.words) ?? ["", "from", "to"];
+  return [["low", low], ["high", high]].map(([name, label]) => ({ name: before + name, label: before ? `${field.label}: ${label}` : label }));
+};
+
+const choiceColumn = ({ choices, otherwise, required }, more) => ({ ...more, type: "select", options: () => (required || otherwise !== undefined ? choices : ["", ...choices]) });
+
+// Tables by the same names are columns of one: {main, beside}.
+export function tablesIn(fields) {
+  const main = fields.filter(({ kind, by, of }) => kind === "table" && by && of.kind === "pair");
+  const found = [];
+  for (const field of main) if (!found.some(({ beside }) => beside.includes(field))) found.push({ main: field, beside: fields.filter((each) => each !== field && each.kind === "table" && each.by === field.by) });
+  return found;
+}
+
+// The columns of a table by paths: the path, its value now, the pair, its unit, then what stands beside.
+export function tableColumns(table) {
+  const { main, beside } = table;
+  return [
+    { name: "path", label: "quantity", type: "select", options: () => namesOfTable(main.key) }, { name: "now", label: "now", type: "now" },
+    ...ends(main), { name: "unit", label: "unit", type: "now" },
+    ...beside.flatMap((field) => (field.of.kind === "pair" ? ends(field, `${field.key}_`) : field.of.kind === "choice" ? [choiceColumn({ ...field.of, otherwise: "" }, { name: field.key, label: field.label })] : [{ name: field.key, label: field.label, off: () => !table.used?.includes(field.key) }])),
+  ];
+}
+
+export function tableBody(rows, { main, beside }) {
+  const body = { [main.key]: {} };
+  for (const row of rows) {
+    const pointer = (key) => `/${key}/${row.path}`;
+    if (row.path in body[main.key]) throw new Unreadable(pointer(main.key), `${row.path} stands there twice.`);
+    const pair = (field, before, all) => ends(field, before).map(({ name, label }) => numberOf(row[name], pointer(all), `${row.path}, ${label},`));
+    body[main.key][row.path] = pair(main, "", main.key);
+    for (const field of beside) {
+      const given = field.of.kind === "pair" ? ends(field, `${field.key}_`).some(({ name }) => row[name] !== undefined) && pair(field, `${field.key}_`, field.key)
+        : row[field.key] !== undefined && (field.of.kind === "number" ? numberOf(row[field.key], pointer(field.key), `${row.path}, ${field.label},`) : row[field.key] !== "auto" && row[field.key]);
+      if (given || given === 0) (body[field.key] ??= {})[row.path] = given;
+    }
+  }
+  return Object.keys(body[main.key]).length ? body : {};
+}
+
+export const rowsOfTable = ({ main, beside }, request) => Object.entries(request[main.key] ?? {}).map(([path, [low, high]]) => Object.assign({ path, low, high }, ...beside.map((field) => {
+  const value = request[field.key]?.[path];
+  return field.of.kind === "pair" && value ? { [`${field.key}_low`]: value[0], [`${field.key}_high`]: value[1] } : { [field.key]: value };
+})));
+
+// The columns of a list of tables; of values by path those in `paths` have a column each.
+export function listColumns({ columns }, paths) {
+  return columns.flatMap((field) => (field.kind === "pair" ? ends({ ...field, words: "" }, `${field.key}_`)
+    : field.kind === "choice" ? [choiceColumn(field, { name: field.key, label: field.label })]
+      : field.kind === "table" ? [...paths.map((path) => ({ name: path, label: path })), { name: field.key, label: "further values", type: "text", hint: "damper.mu = 0.3" }]
+        : [{ name: field.key, label: field.unit ? `${field.label} [${field.unit}]` : field.label, type: field.kind === "number" ? "number" : "text", hint: hintOf({ ...field, ends: "" }), off: () => field.key === "engine_order" && !current.body?.structure.sectors }]));
+}
+
+export function listBody(field, row, index, paths) {
+  const found = {};
+  for (const each of field.columns) {
+    const pointer = `/${field.key}/${index}/${each.key}`;
+    let value;
+    if (each.kind === "pair") {
+      const [low, high] = ends(each, `${each.key}_`).map(({ name }) => row[name]);
+      if (low !== undefined || high !== undefined) value = [numberOf(low, pointer, `${each.label}, from,`), numberOf(high, pointer, `${each.label}, to,`)];
+    } else if (each.kind === "table") {
+      value = { ...readField(each, row[each.key], pointer) };
+      for (const path of paths) if (row[path] !== undefined) value[path] = numberOf(row[path], pointer, path);
+      if (!Object.keys(value).length) value = undefined;
+    } else value = readField(each, row[each.key], pointer);
+    if (value !== undefined) found[each.key] = value;
+  }
+  return found;
+}
+
+export function listRow(field, given, paths) {
+  return Object.assign({}, ...field.columns.map((each) => {
+    const value = given[each.key];
+    if (each.kind === "pair") return { [`${each.key}_low`]: value?.[0], [`${each.key}_high`]: value?.[1] };
+    if (each.kind !== "table") return { [each.key]: value === undefined ? undefined : written(each, value) };
+    const rest = Object.entries(value ?? {}).filter(([path]) => !paths.includes(path));
+    return { ...Object.fromEntries(paths.map((path) => [path, value?.[path]])), [each.key]: written(each, Object.fromEntries(rest)) || undefined };
+  }));
+}

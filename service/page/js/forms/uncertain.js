@@ -1,9 +1,8 @@
 // What is not known: intervals and deviations as rows, or what an identification gave, held as it is.
 
 import { button, byId, el, show } from "../base/dom.js";
-import { boundsTold, namesOfTable } from "./columns.js";
+import { boundsTold, namesOfTable, rowsOf } from "./rows.js";
 import { numberOf, Unreadable } from "./fields.js";
-import { rowsOf } from "./rows.js";
 
 const HOW = { "± share": "deviation", "± value": "absolute_deviation" };
 

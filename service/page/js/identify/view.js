@@ -1,8 +1,7 @@
 // Identification: measured responses and loops, the parameters looked for, the fit, how sure it is, what comes next.
 
-import { state } from "../base/address.js";
+import { on, state, tell } from "../base/state.js";
 import { bad, button, byId, el, facts, note, show, titled } from "../base/dom.js";
-import { on, tell } from "../base/events.js";
 import { csvText, saveText } from "../base/exports.js";
 import { number, percent, seconds, valuesSaid } from "../base/format.js";
 import { chart } from "../charts/chart.js";

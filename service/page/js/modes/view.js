@@ -1,8 +1,7 @@
 // Nonlinear modes: frequency and damping of a free motion over its amplitude, and what follows from them.
 
-import { state } from "../base/address.js";
+import { on, state } from "../base/state.js";
 import { button, byId, el, facts, note, show, titled } from "../base/dom.js";
-import { on } from "../base/events.js";
 import { csvText, saveText } from "../base/exports.js";
 import { length, nearestIn, number, seconds } from "../base/format.js";
 import { chart } from "../charts/chart.js";

@@ -1,11 +1,9 @@
 // Jobs of this page: submitted, watched, taken up again after a reload or a restart of the service.
 
-import { Problem, patiently, post, request } from "./api.js";
-import { state, write } from "../base/address.js";
-import { on, tell } from "../base/events.js";
+import { patiently, post, Problem, request, watch } from "./api.js";
+import { on, state, tell, write } from "../base/state.js";
 import { timing } from "../base/format.js";
 import { lastTold } from "../workbench/run_list.js";
-import { watch } from "./stream.js";
 
 const ENDED = ["successful", "failed", "dismissed"];
 const TICK_MS = 1000;
@@ -19,45 +17,23 @@ const freshKey = () =>
   [...crypto.getRandomValues(new Uint8Array(16))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
 
 // Submits a job of a kind and follows it: `view` hears {progress, points, result, failed, waiting}. Whether it succeeded.
-export async function run(kind, body, view, priority = 0) {
+export function run(kind, body, view, priority = 0) {
   forget(kind);
-  const mine = begin(kind);
-  tell("job-begun", kind);
-  view.waiting?.();
-  const key = freshKey();
-  try {
-    const headers = { "Idempotency-Key": key };
-    const job = await patiently(() => post("/v1/jobs", { kind, priority, ...body, ...inProject() }, { headers, signal: mine.signal }));
+  return heard(kind, view, async ({ signal }) => {
+    const headers = { "Idempotency-Key": freshKey() };
+    const job = await patiently(() => post("/v1/jobs", { kind, priority, ...body, ...inProject() }, { headers, signal }));
     state.jobs[kind] = job.id;
     write();
-    return await follow(kind, job.id, view, mine);
-  } catch (error) {
-    refused(kind, error, view, mine);
-    return false;
-  } finally {
-    if (watching.get(kind) === mine) tell("job-over", kind);
-  }
+    return follow(kind, job.id, view, signal);
+  });
 }
 
 // Follows a job that was submitted before, by this page or the one that shared its link.
-export async function resume(kind, view) {
-  const id = state.jobs[kind];
-  if (!id) return;
-  const mine = begin(kind);
-  tell("job-begun", kind);
-  view.waiting?.();
-  try {
-    await follow(kind, id, view, mine);
-  } catch (error) {
-    if (error instanceof Problem && error.status === 404) {
-      delete state.jobs[kind];
-      write();
-      view.gone?.();
-    } else refused(kind, error, view, mine);
-  } finally {
-    if (watching.get(kind) === mine) tell("job-over", kind);
-  }
-}
+export const resume = (kind, view) => state.jobs[kind] && heard(kind, view, ({ signal }) => follow(kind, state.jobs[kind], view, signal).catch((error) => {
+  if (!(error instanceof Problem && error.status === 404)) throw error;
+  delete state.jobs[kind];
+  write();
+}));
 
 export function forget(kind) {
   watching.get(kind)?.abort();
@@ -65,19 +41,25 @@ export function forget(kind) {
   delete state.jobs[kind];
 }
 
-function begin(kind) {
+// Begins to follow a job of a kind, in place of the one before; what is refused is said by the view.
+async function heard(kind, view, work) {
   watching.get(kind)?.abort();
   const mine = new AbortController();
+  const isMine = () => watching.get(kind) === mine;
   watching.set(kind, mine);
-  return mine;
+  tell("job-begun", kind);
+  view.waiting?.();
+  try {
+    return await work(mine);
+  } catch (error) {
+    if (error.name !== "AbortError" && isMine()) view.failed(error.message, error.errors ?? []);
+    return false;
+  } finally {
+    if (isMine()) tell("job-over", kind);
+  }
 }
 
-function refused(kind, error, view, mine) {
-  if (error.name === "AbortError" || watching.get(kind) !== mine) return;
-  view.failed(error.message, error.errors ?? []);
-}
-
-async function follow(kind, id, view, { signal }) {
+async function follow(kind, id, view, signal) {
   const first = await patiently(() => request(`/v1/jobs/${id}`, { signal }));
   if (typeof first.request.scene === "string" && first.request.scene !== state.scene) return ofAnotherScene(kind, first, view);
   // A scene that a job brought along is stored under a name before its run is shown.
@@ -98,7 +80,6 @@ async function follow(kind, id, view, { signal }) {
     tell("computed", { kind, request: first.request, result: results.result });
   }
   if (job.status === "failed") view.failed(job.error?.detail ?? "The job failed.", job.error?.issues ?? [], results ? null : job);
-  tell("job-ended", job);
   return job.status === "successful";
 }
 

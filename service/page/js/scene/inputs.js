@@ -1,6 +1,6 @@
 // What a result was computed for, against what is set now.
 
-import { state } from "../base/address.js";
+import { state } from "../base/state.js";
 import { number, quantity } from "../base/format.js";
 import { givenByScene, variable, variables } from "./scenes.js";
 

@@ -3,8 +3,7 @@
 
 import { request } from "../network/api.js";
 import { fieldsOf } from "../forms/fields.js";
-import { state } from "../base/address.js";
-import { on, tell } from "../base/events.js";
+import { on, state, tell } from "../base/state.js";
 import { learnUnits, seconds } from "../base/format.js";
 import { asked, current, variable } from "./scenes.js";
 

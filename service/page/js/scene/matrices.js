@@ -3,7 +3,7 @@
 import { Problem, post, request } from "../network/api.js";
 import { button, byId, details, el, facts, onFiles, onSubmit, say, show } from "../base/dom.js";
 import { edit } from "../editor/editor.js";
-import { on } from "../base/events.js";
+import { on } from "../base/state.js";
 import { number } from "../base/format.js";
 import { matrixFiles } from "./files.js";
 import { joined, matrixForm } from "./matrix_form.js";

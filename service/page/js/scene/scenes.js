@@ -1,7 +1,7 @@
 // The scene that is looked at: its tables, its values as set, its paths.
 
 import { everyItem, request } from "../network/api.js";
-import { state } from "../base/address.js";
+import { state } from "../base/state.js";
 import { learnUnits } from "../base/format.js";
 
 // What the service tells of it beside its tables: parameters by path, joints, what each study begins with.

@@ -1,8 +1,7 @@
 // The variable, its range and the number of harmonics: what is wrong is said beside its field.
 
-import { state, write } from "../base/address.js";
+import { state, tell, write } from "../base/state.js";
 import { byId, options, say, show } from "../base/dom.js";
-import { tell } from "../base/events.js";
 import { unitOf } from "../base/format.js";
 import { chooseVariable, defaultRange, variable, variables } from "./scenes.js";
 

@@ -1,7 +1,7 @@
 // The card of a shape: opened by a button, then it follows what is looked at; played, turned, enlarged, saved.
 
 import { button as buttonOf, byId, el, note, options, say, show } from "../base/dom.js";
-import { on } from "../base/events.js";
+import { on } from "../base/state.js";
 import { paperColour, saveBlob } from "../base/exports.js";
 import { lengthUnit, number } from "../base/format.js";
 import { previewer } from "../network/previews.js";

@@ -1,16 +1,14 @@
 // The answer in large figures: what to build, the peak and the band before and after, how far to trust it.
 
-import { state } from "../base/address.js";
+import { on, state } from "../base/state.js";
 import { byId, el, note, show } from "../base/dom.js";
-import { on } from "../base/events.js";
 import { saveFrom } from "../base/exports.js";
 import { length, lengthUnit, number, quantity } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 import { inUse, sameValues } from "../scene/inputs.js";
 import { givenByScene, variable } from "../scene/scenes.js";
 import { load } from "./design.js";
-import { changedSince, isUnderway, staleWords } from "./renewal.js";
-import { pressTakes } from "./study.js";
+import { changedSince, isUnderway, pressTakes, staleWords } from "./study.js";
 
 let designed = null;
 let before = null;

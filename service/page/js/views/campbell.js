@@ -1,9 +1,8 @@
 // The Campbell diagram: where engine orders meet the peaks of the response with friction.
 
 import { facts } from "../base/dom.js";
-import { tell } from "../base/events.js";
-import { length, number } from "../base/format.js";
-import { notes, warnings } from "../base/words.js";
+import { tell } from "../base/state.js";
+import { length, notes, number, warnings } from "../base/format.js";
 import { chart } from "../charts/chart.js";
 import { view } from "./view.js";
 

@@ -1,10 +1,8 @@
 // The best design: what holds it, what one per cent of each parameter does to it, and the plan of the scene.
 
-import { state } from "../base/address.js";
+import { on, state, tell } from "../base/state.js";
 import { bad, button, byId, el, details, facts, note, numeric, scrolledTable, show, titled } from "../base/dom.js";
-import { on, tell } from "../base/events.js";
-import { length, number, quantity, seconds, valuesSaid } from "../base/format.js";
-import { notes } from "../base/words.js";
+import { length, notes, number, quantity, seconds, valuesSaid } from "../base/format.js";
 import { Problem, patiently, post } from "../network/api.js";
 import { previewer } from "../network/previews.js";
 import { asked } from "../scene/scenes.js";

@@ -1,9 +1,8 @@
 // Sliders of the contact and the force, the response that follows them, and earlier ones pinned under it.
 
-import { state, write } from "../base/address.js";
+import { on, state, tell, write } from "../base/state.js";
 import { chart } from "../charts/chart.js";
 import { button, byId, el, options, show } from "../base/dom.js";
-import { on, tell } from "../base/events.js";
 import { length, number, quantity, unitOf } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 import { responseOf, throughPeak } from "../charts/curves.js";

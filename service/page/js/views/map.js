@@ -1,9 +1,8 @@
 // The map of the response over load and frequency, with the ridge of its peaks and the optimum.
 
 import { byId, facts, note } from "../base/dom.js";
-import { on, tell } from "../base/events.js";
-import { length, nearestIn, number, quantity, seconds, withUnit } from "../base/format.js";
-import { notes, warnings } from "../base/words.js";
+import { on, tell } from "../base/state.js";
+import { length, nearestIn, notes, number, quantity, seconds, warnings, withUnit } from "../base/format.js";
 import { heatmap, shadeStrip } from "../charts/heatmap.js";
 import { OF_THE_BAR } from "../scene/kinds.js";
 import { load } from "./design.js";

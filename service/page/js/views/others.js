@@ -1,12 +1,10 @@
 // Studies of kinds that have no view of their own: a form made of the schema of their body, any result as a table,
 // and the drawings of those that have some.
 
-import { state } from "../base/address.js";
+import { on, state } from "../base/state.js";
 import { button, byId, details, el, facts, numeric, options, say, scrolledTable, show, titled } from "../base/dom.js";
-import { on } from "../base/events.js";
 import { saveText } from "../base/exports.js";
-import { number } from "../base/format.js";
-import { notes } from "../base/words.js";
+import { notes, number } from "../base/format.js";
 import { chart } from "../charts/chart.js";
 import { schemaForm } from "../forms/form.js";
 import { resume, run } from "../network/jobs.js";

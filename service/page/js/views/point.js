@@ -1,10 +1,8 @@
 // One point: loops, a period against the time march, harmonics.
 
-import { state, write } from "../base/address.js";
+import { on, state, tell, write } from "../base/state.js";
 import { button, byId, el, facts, say, show, titled } from "../base/dom.js";
-import { on, tell } from "../base/events.js";
-import { largest, length, lengthUnit, number, percent, times } from "../base/format.js";
-import { notes } from "../base/words.js";
+import { largest, length, lengthUnit, notes, number, percent, times } from "../base/format.js";
 import { chart } from "../charts/chart.js";
 import { resume, run } from "../network/jobs.js";
 import { previewer } from "../network/previews.js";

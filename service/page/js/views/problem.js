@@ -1,8 +1,7 @@
 // The panel of a design problem: its form by the schema of the service, and the problem in words above it.
 
-import { state } from "../base/address.js";
+import { on, state } from "../base/state.js";
 import { byId, el, show } from "../base/dom.js";
-import { on } from "../base/events.js";
 import { unitOf } from "../base/format.js";
 import { schemaForm } from "../forms/form.js";
 import { uncertainPart } from "../forms/uncertain.js";

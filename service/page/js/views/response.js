@@ -1,11 +1,9 @@
 // The frequency response of the study, drawn with the live one: points as they come, then peak, band, limits, files.
 
-import { state } from "../base/address.js";
+import { state, tell } from "../base/state.js";
 import { button, el, facts } from "../base/dom.js";
-import { tell } from "../base/events.js";
 import { saveFrom, saveToml } from "../base/exports.js";
-import { length, number, seconds } from "../base/format.js";
-import { betweenPoints, notes } from "../base/words.js";
+import { betweenPoints, length, notes, number, seconds } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 import { OF_THE_BAR } from "../scene/kinds.js";
 import { chosenContact } from "../scene/scenes.js";

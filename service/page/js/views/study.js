@@ -1,17 +1,17 @@
-// The studies behind the one button, each also alone with a form of its keys: their bodies, their order, what became of them.
+// The studies behind the one button, each also alone with a form of its keys: their bodies, their order, what became of
+// them. Cards whose inputs changed since they were computed say so, with one click to compute them again.
 
-import { state, write } from "../base/address.js";
-import { byId, say } from "../base/dom.js";
-import { on, tell } from "../base/events.js";
+import { button, byId, el, say, show } from "../base/dom.js";
+import { on, state, tell, write } from "../base/state.js";
 import { schemaForm } from "../forms/form.js";
 import { run } from "../network/jobs.js";
+import { differences } from "../scene/inputs.js";
 import { askedFor, ofTheBar, proposed, refusedFor, takes } from "../scene/kinds.js";
 import { variable } from "../scene/scenes.js";
 import { readSettings } from "../scene/settings.js";
 import { STUDIES, viewOf } from "../views.js";
 import { PRESS } from "../workbench/run_list.js";
 import { referee } from "./point.js";
-import { computedFor } from "./renewal.js";
 import { complaining } from "./view.js";
 
 // Where a tab is about one study, the button of the bar is that of its form.
@@ -121,4 +121,50 @@ function renew(kind) {
   if (!forms.has(kind)) return tell("resubmit", kind);
   const body = readSettings() && bodyOf(kind);
   return body && begin(kind, { ...body, ...several(kind) });
+}
+
+const WAYS = ["settled", "values", "settings", "contact", "scene-contact"];
+const computed = new Map();
+const underway = new Set();
+
+// The request that what is seen of a kind was computed for.
+export const computedFor = (kind) => computed.get(kind) ?? null;
+
+// What changed since, in words; empty if what is seen is of the present values, or if nothing is seen.
+export const changedSince = (kind) => (computed.has(kind) ? differences(kind, computed.get(kind)) : []);
+
+export const isUnderway = (kind) => underway.has(kind);
+
+export function startRenewal() {
+  const then = (change) => (told) => {
+    change(told);
+    update();
+  };
+  on("scene-left", then(() => [computed, underway].forEach((each) => each.clear())));
+  on("job-begun", then((kind) => underway.add(kind)));
+  on("job-over", then((kind) => underway.delete(kind)));
+  on("computed", then(({ kind, request }) => computed.set(kind, request)));
+  for (const way of WAYS) on(way, update);
+}
+
+// A button that computes a kind again with what is set now.
+const renewButton = (kind, words = "Compute again") =>
+  button(isUnderway(kind) ? "Being computed …" : words, () => tell("renew", kind), { class: "renew", disabled: isUnderway(kind) });
+
+// What a card that is stale says.
+export const staleWords = (kind, changed, words) => (changed.length ? [el("strong", {}, "Stale"), el("span", {}, ` computed for ${changed.join("; ")}. `), renewButton(kind, words)] : []);
+
+function update() {
+  for (const { kind, id } of STUDIES) {
+    const changed = changedSince(kind);
+    const bar = byId(`${id}-stale`);
+    const now = `${changed.join("; ")} ${isUnderway(kind)}`;
+    byId(id).classList.toggle("is-stale", changed.length > 0);
+    bar.hidden = changed.length === 0;
+    // A bar that says the same keeps its button, and with it the focus.
+    if (bar.dataset.says === now) continue;
+    bar.dataset.says = now;
+    show(bar, staleWords(kind, changed));
+  }
+  tell("staleness");
 }

@@ -2,7 +2,7 @@
 // What everything else knows of it (forms, tabs, the one button, what is stale) follows from its entry in views.js.
 
 import { byId, el, say, show } from "../base/dom.js";
-import { on } from "../base/events.js";
+import { on } from "../base/state.js";
 
 // {kind: the job it shows; id, title, tabs: of its card, the first of the tabs shows what was found; wide, hidden;
 //  priority: of its jobs, the most wanted first; pressed: whether the one button begins it too;

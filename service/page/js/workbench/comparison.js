@@ -3,7 +3,7 @@
 import { orNotice, request } from "../network/api.js";
 import { chart } from "../charts/chart.js";
 import { byId, details, note, numeric, scrolledTable, show } from "../base/dom.js";
-import { tell } from "../base/events.js";
+import { tell } from "../base/state.js";
 import { lengthUnit, number, unitOf, when } from "../base/format.js";
 import { kindOf } from "../scene/kinds.js";
 import { titleOf } from "./run_list.js";

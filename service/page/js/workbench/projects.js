@@ -2,9 +2,8 @@
 // the runs, goes to the bin of the service, and comes back on a click.
 
 import { everyItem, orNotice, patched, post, request } from "../network/api.js";
-import { state, write } from "../base/address.js";
+import { on, state, tell, write } from "../base/state.js";
 import { button, byId, el, onSubmit, options, say, show } from "../base/dom.js";
-import { on, tell } from "../base/events.js";
 
 let projects = [];
 let editing = null;

@@ -1,10 +1,8 @@
 // The runs that are known here: listed once, then told by the service as they begin, go on and end.
 
-import { fetched, lost, pause, Problem, request } from "../network/api.js";
-import { eventsOf } from "../network/stream.js";
-import { state } from "../base/address.js";
+import { eventsOf, fetched, lost, pause, Problem, request } from "../network/api.js";
+import { on, state, tell } from "../base/state.js";
 import { byId, say } from "../base/dom.js";
-import { on, tell } from "../base/events.js";
 
 const SIZE = 100;
 const AT_ONCE = 4;

@@ -1,9 +1,8 @@
 // The rail's runs: what is under way, then the last ones with their figure and response; the table has all of them.
 
 import { orNotice, request } from "../network/api.js";
-import { state } from "../base/address.js";
+import { on, state, tell } from "../base/state.js";
 import { button, byId, el, redrawn, say, svg } from "../base/dom.js";
-import { on, tell } from "../base/events.js";
 import { length, quantity, timing, when } from "../base/format.js";
 import { isUnderWay, PINNED, pressOf, runs, summaryOf, titleOf } from "./run_list.js";
 

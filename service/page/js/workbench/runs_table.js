@@ -1,9 +1,8 @@
 // The table of runs: sorted by any column, filtered by words and figures, those of one press folded under it.
 
 import { orNotice, patched } from "../network/api.js";
-import { state, write } from "../base/address.js";
+import { on, state, tell, write } from "../base/state.js";
 import { bad, button, byId, el, note, options, redrawn, say, show } from "../base/dom.js";
-import { on, tell } from "../base/events.js";
 import { csvText, saveText } from "../base/exports.js";
 import { METRES, number, when } from "../base/format.js";
 import { compareRuns } from "./comparison.js";
