@@ -16,17 +16,17 @@ from solver.lab import MissingRoomError, from_lab, rooms
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("solver", "optim", "service", "migrations")
 GIVES = {
-    "accuracy": ["study accuracy"], "all_solutions": ["name solve_all"], "catalogue": ["name catalogue"],
-    "controlled": ["study controlled"], "dask": [], "exports": ["command export"],
-    "limit_cycles": ["name limit_cycles"], "mcp": ["command mcp"], "oidc": [],
+    "accuracy": ["study accuracy", "view accuracy"], "all_solutions": ["name solve_all"],
+    "catalogue": ["name catalogue"], "controlled": ["study controlled"], "dask": [],
+    "exports": ["command export"], "limit_cycles": ["name limit_cycles"], "mcp": ["command mcp"], "oidc": [],
     "posterior": ["study posterior", "command posterior"],
     "proofs": ["command check-proof", "name certify"], "quasi_periodic": ["study quasi-periodic"],
-    "stores": [], "traces": [], "wear_life": ["study wear", "name wear_life"], "widget": ["name explore"],
-    "worst_mistuning": ["study worst-mistuning"],
+    "stores": [], "traces": [], "wear_life": ["study wear", "name wear_life", "view wear_life"],
+    "widget": ["name explore"], "worst_mistuning": ["study worst-mistuning", "view worst_mistuning"],
 }  # fmt: skip
 """What goes with each folder."""
 _LOADED = """
-import importlib, pkgutil, sys
+import importlib, pkgutil, re, sys
 import optim, service, solver, stickslip
 for package in (solver, optim, service, stickslip):
     for found in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
@@ -38,10 +38,12 @@ for package in (solver, optim, stickslip):
 from service.cli.table import command
 from service.jobs.kinds import SHIPPED
 from service.http.app import create_app
+from service.http.routes.page import files
 from service.settings.settings import Settings
 names = {f"name {name}" for package in (solver, optim) for name in package.__all__}
 commands = {f"command {name}" for name in command().commands}
-there = names | commands | {f"study {kind.name}" for kind in SHIPPED}
+views = {f"view {room}" for room in re.findall(r"view as (\\w+)", files()["js/lab.js"].decode())}
+there = names | commands | views | {f"study {kind.name}" for kind in SHIPPED}
 assert create_app(Settings(database="sqlite:///lab.db")).openapi()["paths"]
 assert solver.sweep("two-dof", harmonics=3).peak.value > 0.0
 print(*sorted(there), sep="\\n")

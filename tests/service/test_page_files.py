@@ -88,6 +88,19 @@ def test_a_module_that_cannot_be_put_with_the_others_is_named(a: str, b: str, wo
         bundle({"a.js": a, "b.js": b}, "a.js")
 
 
+def test_the_recipe_of_a_view_is_one_file_and_a_line() -> None:
+    told = (FOLDER.parents[1] / "CONTRIBUTING.md").read_text("utf-8")
+    (recipe,) = re.findall(r"^```js\n(.*?)^```$", told, flags=re.MULTILINE | re.DOTALL)
+    texts = {path: data.decode() for path, data in page.files().items() if path.endswith(".js")}
+    views = texts["js/views.js"].replace("VIEWS = [", "VIEWS = [frequencies, ")
+    views = views.replace("\nimport ", '\nimport { frequencies } from "./views/frequencies.js";\nimport ', 1)
+    made = bundle(texts | {"js/views.js": views, "js/views/frequencies.js": recipe}, "js/main.js")
+    assert "// js/views/frequencies.js\n" in made
+    known = texts["js/views/view.js"].partition("export function view(")[0]
+    for key in re.findall(r"(?:^  |, )(\w+)(?=: )", recipe, flags=re.MULTILINE):
+        assert re.search(rf"\b{key}\b", known), key
+
+
 def test_the_page_has_words_for_every_flag() -> None:
     text = (FOLDER / "js" / "base" / "format.js").read_text(encoding="utf-8")
     told = dict(re.findall(r'^  (\w+): "(.*)",$', text, flags=re.MULTILINE))
