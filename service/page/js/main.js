@@ -3,7 +3,7 @@
 import { asOneStep, lastWritten, on, read, state, tell, write } from "./base/state.js";
 import { button, byId, dropsOn, el, onFiles, options, show } from "./base/dom.js";
 import { saveToml } from "./base/exports.js";
-import { finishLogin, startNotices } from "./base/notices.js";
+import { startNotices } from "./base/notices.js";
 import { edit, editCurrent, newScene } from "./editor/editor.js";
 import { Problem, patiently, post, watchStart } from "./network/api.js";
 import { forget, resume, run } from "./network/jobs.js";
@@ -138,11 +138,10 @@ async function openedRun({ id, kind, request }) {
     byId("scene").value = scene;
     await change(scene);
   }
-  const [range] = Object.values(request.variables ?? {});
   Object.assign(state, { set: { ...request.set }, harmonics: request.harmonics ?? state.harmonics });
-  const [path] = Object.keys(request.variables ?? {});
+  const [[path, range] = [], ...more] = Object.entries(request.variables ?? {});
   const varied = path ?? (request.from === undefined ? "" : request.parameter);
-  if (varied && !varied.includes(",") && Object.keys(request.variables ?? {}).length < 2) {
+  if (varied && !varied.includes(",") && !more.length) {
     [state.contact, state.variable = ""] = varied.split(".");
     state.range = range ?? [request.from, request.to];
   }
@@ -218,7 +217,7 @@ async function start() {
   startTheme();
   startNotices();
   watchStart();
-  await finishLogin();
+  for (const view of VIEWS) await view.begin();
   read();
   placeCards(VIEWS);
   for (const begins of [startTabs, startProjects, startRunList, startRuns, startRunsTable, startComparison, startLive]) begins();

@@ -1,16 +1,10 @@
-// What the page says about itself: the service away, a refusal, a key wanted; logging in with the organisation's account.
+// What the page says about itself: the service away, a refusal, a key wanted.
 
-import { post, request, setKey } from "../network/api.js";
-import { button, byId, el, onSubmit, say, show } from "./dom.js";
+import { setKey } from "../network/api.js";
+import { button, byId, onSubmit, say, show } from "./dom.js";
 import { on, tell } from "./state.js";
 
 const NOTICE_SECONDS = 12;
-const REFUSED = {
-  expired: "The log-in took too long: begin again.",
-  refused: "The log-in was refused where your organisation's accounts are.",
-  "not-allowed": "Your account may not use this service: ask who runs it.",
-  unreachable: "Where your organisation's accounts are, nothing answers: try again in a minute.",
-};
 let fading = 0;
 
 // The banner says something, or nothing; what stays does so until something else is said.
@@ -31,11 +25,9 @@ export function startNotices() {
   // While the service starts the banner says what; what goes on then is not for it to hide.
   on("starting", (text) => told(text ?? "", true));
   on("notice", (text) => told([text, " ", button("Close", silent)]));
-  on("key-wanted", async (problem) => {
+  on("key-wanted", (problem) => {
     byId("key-form").hidden = false;
     say("key-status", problem.message);
-    const { url } = await request("/v1/login").catch(() => ({ url: null }));
-    show(byId("key-login"), url ? el("a", { href: url }, "Log in with your account") : "");
   });
   onSubmit(byId("key-form"), () => {
     setKey(byId("key").value.trim());
@@ -43,15 +35,4 @@ export function startNotices() {
     byId("key-form").hidden = true;
     tell("key");
   });
-}
-
-// What the address says of a log-in that just ended is taken out of it before anything is asked.
-export async function finishLogin() {
-  const words = new URLSearchParams(location.search);
-  const ended = words.get("login");
-  if (ended === null) return;
-  words.delete("login");
-  history.replaceState(null, "", `${location.pathname}${words.size ? `?${words}` : ""}`);
-  if (ended === "done") setKey((await post("/v1/login/key", {}).catch(() => ({ key: "" }))).key);
-  else tell("notice", REFUSED[ended] ?? REFUSED.refused);
 }

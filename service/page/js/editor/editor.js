@@ -8,11 +8,10 @@ import { fieldsOf } from "../forms/fields.js";
 import { schemaForm } from "../forms/form.js";
 import { post, Problem, request } from "../network/api.js";
 import { current } from "../scene/scenes.js";
-import { idOf } from "./cells.js";
+import { drawTables, forgetOpened, idOf, openMissing } from "./tables.js";
 import { sceneDocument } from "./document.js";
 import { tidied } from "./scene_data.js";
 import { loadSchema } from "./schema.js";
-import { drawTables, forgetOpened, openMissing } from "./tables.js";
 import { tomlPane } from "./toml_pane.js";
 
 let doc = null;
@@ -234,7 +233,7 @@ function fieldOf(fields, pointer) {
   return inside ?? exact?.querySelector("input, select") ?? null;
 }
 
-export function markFields(host, issues) {
+function markFields(host, issues) {
   for (const node of host.querySelectorAll(".message")) node.remove();
   for (const node of host.querySelectorAll("[aria-invalid]")) {
     node.removeAttribute("aria-invalid");
@@ -266,7 +265,7 @@ function below(row, words) {
   else row.after(el("tr", { class: "message" }, el("td", { colspan: String(row.cells.length) }, words)));
 }
 
-export function issueList(issues, go) {
+function issueList(issues, go) {
   if (!issues.length) return null;
   return el("ul", { class: "issues issue-list", "aria-label": "What is wrong" }, issues.map((issue) => el("li", {},
     el("button", { type: "button", class: "link", onclick: () => go(issue) }, `${placeOf(issue.pointer)}${issue.line ? `, line ${issue.line}` : ""}`), ` ${issue.detail}`)));
@@ -275,7 +274,7 @@ export function issueList(issues, go) {
 const EMPTY = "ground-damper";
 let templates = null;
 
-export async function openChooser(panel, { made, close }) {
+async function openChooser(panel, { made, close }) {
   show(panel, el("p", { class: "note", role: "status" }, "The cases are being fetched …"));
   templates ??= (await request("/v1/templates")).items;
   const fill = async (template, answers) => made((await post("/v1/templates", { template, answers })).scene);

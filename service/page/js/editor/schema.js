@@ -1,5 +1,6 @@
 // What a scene may hold, by the schema of the service: its tables with their keys, units, words and choices.
 
+import { endsOf } from "../forms/fields.js";
 import { request } from "../network/api.js";
 import { parameterOf } from "../scene/kinds.js";
 
@@ -78,10 +79,8 @@ function usualOf(scene, path, choices) {
 const lastUnit = (words) => [...(words ?? "").matchAll(/\[([^\]]+)\]/g)].pop()?.[1] ?? "";
 
 function typeOf(node) {
-  if (node.enum) return "choice";
-  if (node.const !== undefined) return "choice";
+  if (node.enum || node.const !== undefined || node.type === "boolean") return "choice";
   if (node.type === "number" || node.type === "integer") return "number";
-  if (node.type === "boolean") return "choice";
   if (node.type === "string") return "text";
   if (node.prefixItems?.length === 2 && node.prefixItems.every((each) => each.type === "string")) return "pair";
   if (node.prefixItems?.every((each) => each.type === "number")) return "numbers";
@@ -101,17 +100,8 @@ export function keyOf(scene, path, row, key) {
   return {
     key, type, words: node.description ?? "", unit: law?.unit ?? (numeric ? lastUnit(node.description) : ""), required: (of.required ?? []).includes(key),
     choices: choices ?? node.enum ?? (node.const !== undefined ? [node.const] : node.type === "boolean" ? [true, false] : null),
-    otherwise: choices ? usualOf(scene, path, choices) : node.default, example: node.examples?.[0], range: rangeOf(node),
+    otherwise: choices ? usualOf(scene, path, choices) : node.default, example: node.examples?.[0], range: endsOf(node),
   };
-}
-
-function rangeOf({ minimum, exclusiveMinimum: above, maximum, exclusiveMaximum: below }) {
-  const parts = [];
-  if (above !== undefined) parts.push(`above ${above}`);
-  else if (minimum !== undefined && minimum > -1e9) parts.push(`from ${minimum}`);
-  if (below !== undefined) parts.push(`below ${below}`);
-  else if (maximum !== undefined && maximum < 1e9) parts.push(`to ${maximum}`);
-  return parts.join(" ");
 }
 
 const rank = (key, index) => (FIRST.includes(key) ? FIRST.indexOf(key) - 100 : LAST.includes(key) ? 1000 + LAST.indexOf(key) : index);

@@ -1,7 +1,7 @@
-// The sections of a scene as tables: a row for each mass, spring, contact …, a column for each value.
+// The sections of a scene as tables: a row for each mass, spring, contact …, a column for each value; one value as a field:
+// how it is shown, and how what was typed is read.
 
 import { button, el, note, show, svg } from "../base/dom.js";
-import { cell, idOf, nameCell, textOf } from "./cells.js";
 import { addRow, completed, dofsOf, doubleRow, endsOf, escaped, isKept, removeRow, rename, rowsOf, setCell } from "./scene_data.js";
 import { keyOf, keysOf, oneOf, requiredKeys, sectionsOf, titleOf, wordsOf } from "./schema.js";
 
@@ -180,4 +180,93 @@ function moreKeys(scene, path, row, shown, edit, index) {
     edit(null, `cell:${path}:${index}:${select.value}`);
   });
   return select;
+}
+
+const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
+
+export const idOf = (pointer) => `field${pointer.replaceAll(/[^A-Za-z0-9]/g, "-")}`;
+
+const plainList = (value) => Array.isArray(value) && value.every((one) => one === null || typeof one !== "object");
+
+const plainTable = (value) => value !== null && typeof value === "object" && !Array.isArray(value) && Object.values(value).every((one) => one === null || typeof one !== "object");
+
+// A value in the words of its field.
+function textOf(value, type) {
+  if (value === undefined || value === null) return "";
+  if (type === "numbers" && plainList(value)) return value.join(", ");
+  if (type === "names" && plainTable(value)) return Object.entries(value).map(([key, one]) => `${key} = ${one}`).join(", ");
+  return typeof value === "object" ? JSON.stringify(value) : String(value);
+}
+
+const one = (text) => (NUMBER.test(text) ? Number(text) : text);
+
+// What was typed; undefined if nothing was.
+function readCell(text, type) {
+  const typed = text.trim();
+  if (typed === "") return undefined;
+  if (type === "number") return one(typed);
+  if (type === "text") return typed;
+  if (type === "numbers" && !typed.startsWith("[")) return typed.split(/[,;\s]+/).filter(Boolean).map(one);
+  if (type === "names" && !typed.startsWith("{")) {
+    const pairs = typed.split(",").map((part) => part.split("=").map((word) => word.trim()));
+    return pairs.every((pair) => pair.length === 2 && pair[0]) ? Object.fromEntries(pairs.map(([key, value]) => [key, one(value)])) : typed;
+  }
+  if (/^[[{]/.test(typed) || typed === "true" || typed === "false") {
+    try {
+      return JSON.parse(typed);
+    } catch {
+      return typed;
+    }
+  }
+  return one(typed);
+}
+
+function typed(attributes, value, width) {
+  const input = el("input", { type: "text", spellcheck: false, autocomplete: "off", ...attributes });
+  if (width) input.style.width = `calc(${width}ch + 1.1rem)`;
+  input.value = value;
+  return input;
+}
+
+// The field or fields of a value. `told` is called with the value whenever it is another one.
+function cell({ pointer, name, about, type, choices, otherwise, value, list, width }, told) {
+  const common = { "aria-label": about, "data-pointer": pointer, id: idOf(pointer), "data-key": name };
+  if (type === "choice") return choice(common, choices, value, otherwise, told);
+  if (type === "pair") return pair(common, Array.isArray(value) ? value : [], list, width, told);
+  const placeholder = otherwise === undefined || otherwise === null ? "" : textOf(otherwise, type);
+  const input = typed({ ...common, value: "", list: list || undefined, class: type === "number" ? "number" : undefined, placeholder }, textOf(value, type), width);
+  input.addEventListener("input", () => told(readCell(input.value, type)));
+  return input;
+}
+
+function choice(common, choices, value, otherwise, told) {
+  const known = value === undefined || choices.includes(value) ? choices : [...choices, value];
+  const empty = value === undefined ? [el("option", { value: "" }, otherwise === undefined ? "" : String(otherwise))] : [];
+  const select = el("select", common, empty, known.map((word) => el("option", { value: String(word), selected: word === value }, String(word))));
+  select.addEventListener("change", () => told(known.find((word) => String(word) === select.value)));
+  return select;
+}
+
+function pair(common, value, list, width, told) {
+  const ends = [0, 1].map((i) => {
+    const pointer = `${common["data-pointer"]}/${i}`;
+    return typed({ ...common, list, id: idOf(pointer), "data-pointer": pointer, "aria-label": `${common["aria-label"]}, end ${i + 1}` }, textOf(value[i], "text"), width);
+  });
+  for (const input of ends) {
+    input.addEventListener("input", () => {
+      const words = ends.map((end) => end.value.trim());
+      told(words.some(Boolean) ? words : undefined);
+    });
+  }
+  return el("span", { class: "ends" }, ends[0], el("span", { "aria-hidden": "true" }, "–"), ends[1]);
+}
+
+// A name that other parts refer to: it is changed when the field is left, not with every letter.
+function nameCell({ pointer, about, value }, told) {
+  const input = typed({ id: `${idOf(pointer)}-name`, "data-late": "yes", "aria-label": about, "data-pointer": `${pointer}#`, "data-key": "name" }, value, Math.max(value.length, 6));
+  input.addEventListener("change", () => {
+    const name = input.value.trim();
+    if (!name || name === value || !told(name)) input.value = value;
+  });
+  return input;
 }

@@ -37,7 +37,7 @@ function kindOf(node, defs) {
 }
 
 // One key of a body: {key, label, kind, unit, words, ends, otherwise, …}.
-export function fieldOf(key, schema, defs, required = false) {
+function fieldOf(key, schema, defs, required = false) {
   const suffix = Object.keys(SUFFIXES).find((end) => key.endsWith(end));
   return {
     key, required, words: schema.description ?? "", unit: UNIT.exec(schema.description ?? "")?.[1] ?? SUFFIXES[suffix] ?? "",
@@ -48,7 +48,8 @@ export function fieldOf(key, schema, defs, required = false) {
 export const fieldsOf = ({ properties, required = [], $defs = {} }) =>
   Object.entries(properties).map(([key, schema]) => fieldOf(key, schema, $defs, required.includes(key)));
 
-function endsOf({ minimum, exclusiveMinimum: above, maximum, exclusiveMaximum: below }) {
+// The ends that a number keeps within, in words.
+export function endsOf({ minimum, exclusiveMinimum: above, maximum, exclusiveMaximum: below }) {
   const far = (end) => end === undefined || Math.abs(end) >= 1e9;
   if (minimum > 0 && minimum < TINY) return endsOf({ exclusiveMinimum: 0, maximum, exclusiveMaximum: below });
   return [above !== undefined && !far(above) ? `above ${above}` : far(minimum) ? "" : `from ${minimum}`,

@@ -2,10 +2,10 @@
 
 import { state } from "../base/state.js";
 import { number, quantity } from "../base/format.js";
+import { hasHarmonics } from "./kinds.js";
 import { givenByScene, variable, variables } from "./scenes.js";
 
 const USUAL_HARMONICS = 11;
-const WITHOUT_HARMONICS = ["accuracy", "march", "transient", "interference", "quasi-periodic"];
 const CLOSE = 1e-9;
 
 const same = (a, b) => a === b || Math.abs(a - b) <= CLOSE * Math.max(Math.abs(a), Math.abs(b));
@@ -47,7 +47,7 @@ function changedRange(request) {
 // In words, what has changed since a study of a kind was asked; empty if nothing.
 export function differences(kind, request) {
   const [was, is] = [request.harmonics ?? USUAL_HARMONICS, state.harmonics];
-  const harmonics = was === is || WITHOUT_HARMONICS.includes(kind) ? [] : [`${was} harmonics, now ${is}`];
+  const harmonics = was === is || !hasHarmonics(kind) ? [] : [`${was} harmonics, now ${is}`];
   return [...changedValues(request), ...changedRange(request), ...harmonics];
 }
 

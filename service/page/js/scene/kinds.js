@@ -26,10 +26,13 @@ export const kindOf = (name) => kinds.get(name);
 
 const keyed = (name, key) => kinds.get(name)?.fields.find((field) => field.key === key);
 
+// Whether a kind is asked with a number of harmonics.
+export const hasHarmonics = (name) => kinds.get(name)?.body.properties.harmonics?.type === "integer";
+
 // What a request of a kind says of the scene.
 export function askedFor(name) {
   const { harmonics, ...body } = asked();
-  return kinds.get(name)?.body.properties.harmonics?.type === "integer" ? { ...body, harmonics } : body;
+  return hasHarmonics(name) ? { ...body, harmonics } : body;
 }
 
 // The variable of the bar with its range, in the keys that a kind has for it.

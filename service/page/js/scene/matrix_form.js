@@ -50,25 +50,25 @@ export function matrixForm(host, { onUnits }) {
   const damping = amount("0.001", { step: "any" });
   const force = el("select", {});
   const observed = el("select", {});
-  let named = [];
-  let rubbing = [];
+  const [named, rubbing] = [[], []];
   let disk = null;
 
   units.addEventListener("change", onUnits);
 
+  // A further row of fields, with a button that leaves it out again.
+  function added(host, list, what, one, ...fields) {
+    one.node = el("div", { class: "fields" }, fields, button("Leave out", () => { list.splice(list.indexOf(one), 1); one.node.remove(); choices(); }, { "aria-label": `Leave out the ${what} ${one.label.value}` }));
+    list.push(one);
+    host.append(one.node);
+    choices();
+    return one.label;
+  }
+
   function addDof(given) {
     const label = filled(given, { class: "dof-name" });
     const row = text("", { list: "matrix-places" });
-    const one = { label, row };
-    one.node = el("div", { class: "fields" },
-      field("Name", label, () => []),
-      (one.field = field("Node and direction, or row", row, () => [`/structure/dofs/${label.value.trim()}`])),
-      button("Leave out", () => { named = named.filter((each) => each !== one); one.node.remove(); choices(); }, { "aria-label": `Leave out the DOF ${given}` }));
     label.addEventListener("change", choices);
-    named.push(one);
-    dofs.append(one.node);
-    choices();
-    return label;
+    return added(dofs, named, "DOF", { label, row }, field("Name", label, () => []), field("Node and direction, or row", row, () => [`/structure/dofs/${label.value.trim()}`]));
   }
 
   function addContact(given) {
@@ -76,15 +76,10 @@ export function matrixForm(host, { onUnits }) {
     const ends = [el("select", {}), el("select", {})];
     const one = { label, ends };
     const at = () => rubbing.indexOf(one);
-    one.node = el("div", { class: "fields" },
+    return added(contacts, rubbing, "contact", one,
       field("Contact", label, () => [`/contacts/${at()}/name`, `/contacts/${at()}`]),
       field("rubs between", ends[0], () => [`/contacts/${at()}/between/0`, `/contacts/${at()}/between`]),
-      field("and", ends[1], () => [`/contacts/${at()}/between/1`]),
-      button("Leave out", () => { rubbing = rubbing.filter((each) => each !== one); one.node.remove(); }, { "aria-label": `Leave out the contact ${given}` }));
-    rubbing.push(one);
-    contacts.append(one.node);
-    choices();
-    return label;
+      field("and", ends[1], () => [`/contacts/${at()}/between/1`]));
   }
 
   // The names of the DOFs in every list that offers them; what was chosen stays.

@@ -128,7 +128,7 @@ const computed = new Map();
 const underway = new Set();
 
 // The request that what is seen of a kind was computed for.
-export const computedFor = (kind) => computed.get(kind) ?? null;
+const computedFor = (kind) => computed.get(kind) ?? null;
 
 // What changed since, in words; empty if what is seen is of the present values, or if nothing is seen.
 export const changedSince = (kind) => (computed.has(kind) ? differences(kind, computed.get(kind)) : []);

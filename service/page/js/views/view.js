@@ -9,7 +9,8 @@ import { on } from "../base/state.js";
 //  form: {words, primary, hide, top, groups, fold} of the keys of its body; bar: {form, words, free}, where the button of
 //  the bar is that of its form while its tab is seen, `free` without a variable to design;
 //  about: what it says before anything is computed; work: what waits for a worker; goes(job): how far it is;
-//  figure(host): its chart; parts(): what the card has in its order; start(): once; scene(): at each scene;
+//  figure(host): its chart; parts(): what the card has in its order; begin(): before anything is asked; start(): once,
+//  when the cards are there; scene(): at each scene;
 //  result, points, submitted: what jobs tell; drawings(result): of a kind without a card, those of “Other studies”}
 export function view({ id, title, work, goes, about = "", ...own }) {
   const self = {
@@ -21,6 +22,7 @@ export function view({ id, title, work, goes, about = "", ...own }) {
     progress: (job) => self.say(goes(job)),
     failed: (words) => self.say(words, true),
     parts: () => [formPart(id), statusPart(id), self.figure && figurePart(`${id}-figure`), el("div", { id: `${id}-facts` })],
+    begin() {},
     start() {},
     scene() {},
     clear() {
@@ -41,10 +43,10 @@ export const figurePart = (id) => el("div", { class: "figure", id });
 export const placeCards = (views) => byId("runs").before(...views.filter(({ title }) => title).map(cardOf));
 
 export function startViews(views) {
-  for (const each of views.filter(({ title }) => title)) {
+  for (const each of views) {
     if (each.figure) each.plot = each.figure(byId(`${each.id}-figure`));
     each.start();
-    on("scene", () => {
+    if (each.title) on("scene", () => {
       each.clear();
       each.scene();
     });

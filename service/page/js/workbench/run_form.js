@@ -75,7 +75,7 @@ function told(sweep, all) {
   return Object.keys(mine).filter((path) => path.endsWith(".N0") || each.some((other) => other[path] !== mine[path])).map((path) => (path === "harmonics" ? `${mine[path]} harmonics` : `${path} ${quantity(path, mine[path])}`)).join(", ");
 }
 
-export function sweepsOf(run, title) {
+function sweepsOf(run, title) {
   const list = el("div", {}, note("…"));
   const node = el("details", {}, el("summary", { "aria-label": `Sweeps of run ${title}` }, `Its ${run.sweeps === 1 ? "sweep" : `${run.sweeps} sweeps`}`), list);
   node.addEventListener("toggle", async () => {
