@@ -241,7 +241,8 @@ def test_a_length_has_a_unit_of_its_size(profile: Profile, site: Site) -> None:
     said = page.evaluate(
         """async () => {
           const source = new URL("base/format.js", document.querySelector("script[type=module]").src);
-          const { length, quantity } = await import(source);
+          const { learnUnits, length, quantity } = await import(source);
+          learnUnits([["kt", "N/m"], ["N0", "N"]]);
           return [length(4.8e-14), length(3e-9), length(2.5e-5),
             quantity("damper.kt", 509000), quantity("shroud.N0", 92.7)];
         }"""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Profile = tuple["BrowserContext", Watch]
 # What is said of a job at a quarter after 12 s and after 12 min, just begun, and at its end.
 TIMING = """async () => {
-  const source = new URL("base/timing.js", document.querySelector("script[type=module]").src);
+  const source = new URL("base/format.js", document.querySelector("script[type=module]").src);
   const { timing } = await import(source);
   const started = "2026-01-01T00:00:00Z", at = (s) => Date.parse(started) + 1000 * s;
   const runs = (progress, s) => timing({ status: "running", progress, started }, at(s));
