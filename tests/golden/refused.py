@@ -10,6 +10,7 @@ import httpx
 from fastapi import FastAPI
 from service_helpers import settings_of
 
+import solver
 from service.errors import InvalidRequestError
 from service.http.app import create_app
 from service.jobs import answering
@@ -20,6 +21,16 @@ LOAD = {"parameter": "damper.N0", "from": 50, "to": 200}
 _DISK = {"scene": "bladed-disk"}
 _CASE = {"name": "one"}
 _UNCERTAIN = {"damper.mu": [0.25, 0.35], "damper.kt": {"deviation": 0.1}}
+_TWO = solver.load_scene("two-dof").to_dict()
+# For its contacts there are no exact second derivatives: no peak is tracked.
+_RING = {**_TWO, "contacts": [{"name": "ring", "law": "dahl", "between": ["m1", "ground"], "sigma": 5.0,
+                               "limit": 0.3}]}  # fmt: skip
+_MANY = {**_TWO, "contacts": [{**_TWO["contacts"][0], "name": f"c{index}"} for index in range(100)]}
+"""More unknowns than a worker has memory for."""
+_OF_MANY: dict[str, dict[str, Any]] = {
+    "solve": {"frequency_hz": 1}, "sweep": {}, "design": {"variables": {"c0.N0": [1, 2]}},
+    "pareto": {"variables": {"c0.N0": [1, 2]}},
+}  # fmt: skip
 _OF_ALL = ("scene", "set", "fresh", "priority", "max_seconds", "project", "name", "notes", "tags")
 _WRONG: tuple[Any, ...] = ("x", -1, [], None)
 # Beside a variable, `damper.N0` from 20 to 1000.
@@ -71,22 +82,33 @@ _MEANT: dict[str, tuple[dict[str, Any], ...]] = {
         {"harmonics": 201},
         {"set": {"damper.mu": -1}}, {"set": {"nothing.mu": 1}}, {"scene": "nothing"}, {"scene": 7},
         {"scene": {"name": "x"}}, {"set": {"damper.N0": "1"}}, {"stability": "yes"}, {"priority": 101},
-        {"fresh": 1}, {"max_seconds": 0}, {"tags": "x"}, {"project": 1}, {"name": 1},
+        {"fresh": 1}, {"max_seconds": 0}, {"tags": "x"}, {"project": 1}, {"name": 1}, {"scene": None},
+        {"scene": "/etc/passwd"}, {"scene": "../two-dof.toml"}, {"scene": {"a/b": 1}},
+        {"parameter": "x" * 300}, {"set": {"damper.mu": -0.1, "nothing.N0": 1, "damper.N0": 2}},
+        {"set": [1]}, {"harmonics": 5.5}, {**LOAD, "to": -5, "frequency_hz": 1},
     ),
     "map": (
         {**LOAD, "to": 50}, {**LOAD, "parameter": "frequency"}, {**LOAD, "steps": 1},
         {**LOAD, "steps": 10**6},
         {**LOAD, "frequencies": 1}, {**LOAD, "from": -50}, {**LOAD, "steps": 3000, "frequencies": 3000},
+        {}, {**LOAD, "steps": 5.5, "frequencies": "many"}, {**LOAD, "steps": 1000, "frequencies": 501},
+        {**_DISK, "parameter": "shroud.N0", "from": 20, "to": -1, "steps": 1000, "frequencies": 500,
+         "harmonics": 200, "ridge": False},
+        {**LOAD, "scene": _RING},
     ),
     "peaks": (
         {**LOAD, "to": 50}, {**LOAD, "parameter": "frequency"}, {**LOAD, "parameter": "damper.N2"},
         {**LOAD, "from": -50}, {**LOAD, "checks": 201}, {"parameter": "damper.N0"}, {**LOAD, "harmonics": 0},
+        {**LOAD, "from": -1, "to": -1}, {**LOAD, "frequency_hz": 1}, {**LOAD, "set": {"damper.N0": -3}},
+        {**LOAD, "to": "high"}, {**LOAD, "scene": _RING},
     ),
     "campbell": (
         {}, {"speeds_rpm": [50, 80]}, {"speeds_rpm": [[80, 50]]}, {"speeds_rpm": [[60, 80], [0, 1]]},
         {"speeds_rpm": [[50, 1e12]]}, {"speeds_rpm": [[50, 80]], "orders": [0]},
         {"speeds_rpm": [[50, 80]], "orders": [1.5]}, {"speeds_rpm": [[50, 80]], "band_hz": [2, 1]},
         {"speeds_rpm": [[50, 80]], "band_hz": [0, 1]}, {"speeds_rpm": [[50, 80]], "limit": 0},
+        {"speeds_rpm": [[60, 100], [100, 110], [0, 5], [1, 1e12]]}, {"speeds_rpm": [[60, 100], [100, 60]]},
+        {"speeds_rpm": [[50, 80]], "orders": [1, 0, 1.5]}, {"speeds_rpm": [[50, 80]], "orders": [1] * 101},
     ),
     "modes": (
         {"from": 2, "to": 1}, {"from": 0, "to": 1}, {"from": 1, "to": 2, "mode": 9},
@@ -107,12 +129,26 @@ _MEANT: dict[str, tuple[dict[str, Any], ...]] = {
     ),
     "controlled": ({"amplitude": 0}, {"amplitude": 1, "from": 3}, {"amplitude": 1, "dof": "x"}, {}),
     "interference": ({}, {**_DISK, "orders": [0]}, {**_DISK, "within": 2}, {**_DISK, "orders": [1]}),
-    "solve": ({"frequency_hz": 0}, {}, {"frequency_hz": 1, "starts": -1}, {"frequency_hz": 1, "seed": -1}),
-    "march": ({"frequency_hz": 1, "steps_per_period": 10**9}, {"frequency_hz": 1, "max_periods": 0}),
-    "accuracy": ({"samples": [5]}, {"harmonics": []}, {"repeats": 1000, "samples": [65536] * 9}),
+    "solve": (
+        {"frequency_hz": 0}, {"frequency_hz": 1e12}, {"frequency_hz": 1, "max_seconds": 3601}, {},
+        {"frequency_hz": 1, "starts": -1}, {"frequency_hz": 1, "seed": -1},
+    ),
+    "march": (
+        {"frequency_hz": 1, "steps_per_period": 10**9}, {"frequency_hz": 1, "max_periods": 0},
+        {"frequency_hz": 1, "harmonics": 3}, {"frequency_hz": 1, "tolerance": 1.0},
+        {"frequency_hz": 1, "steps_per_period": 100_000, "max_periods": 1_000_000},
+    ),
+    "accuracy": (
+        {"samples": [5]}, {"harmonics": []}, {"repeats": 1000, "samples": [65536] * 9},
+        {"frequency_hz": 1, "harmonics": [3, 0]}, {"frequency_hz": 1, "samples": [64, 66]},
+        {"frequency_hz": 1, "from": 1}, {"frequency_hz": 1, "repeats": 1000, "samples": [65536]},
+    ),
     "mistuning": (
         {"of": "m1"}, {**_DISK, "of": ["nothing"]}, {**_DISK, "of": "tip", "from": 3, "to": 2},
-        {**_DISK, "of": "tip", "dof": "nothing"}, {**_DISK, "of": "tip", "samples": 10001},
+        {**_DISK, "of": "tip", "dof": "nothing"}, {**_DISK, "of": "tip", "samples": 10001}, _DISK,
+        {**_DISK, "of": ["tip", 5]}, {**_DISK, "of": ["tip", "nothing", "nobody"]}, {**_DISK, "of": "../tip"},
+        {**_DISK, "of": "tip", "spread": 0.9}, {**_DISK, "of": "tip", "dof": "tip@1"},
+        {**_DISK, "of": "tip", "samples": 10_000, "harmonics": 200}, {**_DISK, "of": "tip", "values": [1.0]},
     ),
     "worst-mistuning": (
         {"of": "m1"}, {**_DISK, "of": ["nothing"]}, {**_DISK, "of": "tip", "from": 3, "to": 2},
@@ -160,6 +196,8 @@ def bodies() -> Iterator[Body]:
     """What is meant to be refused, and every key of every kind with what it hardly takes."""
     for kind, changes in _MEANT.items():
         yield from (Body(kind, change, {"scene": "two-dof"}) for change in changes)
+    for kind, change in _OF_MANY.items():
+        yield Body(kind, {**change, "harmonics": 61}, {"scene": _MANY})
     one_variable = {"scene": "two-dof", "variables": {"damper.N0": [20, 1000]}}
     yield from (Body("design", change, one_variable) for change in _DESIGN)
     for one in SHIPPED:

@@ -162,7 +162,7 @@ def beyond(mean: float, *, line: str = "goodman", force: float = 1.0) -> Scene:
 ENDS = {"goodman": 0.9, "gerber": 0.9, "soderberg": 0.7}
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(9)
 @pytest.mark.parametrize("line", ENDS)
 @pytest.mark.parametrize("share", [1.01, 1.5, 5.0])
 def test_a_mean_beyond_the_strength_leaves_no_margin(line: str, share: float) -> None:

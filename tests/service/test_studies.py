@@ -4,7 +4,6 @@ from typing import Any
 
 import httpx
 import pytest
-from each import each
 from service_helpers import is_problem, job_ids, until
 
 import optim
@@ -139,77 +138,9 @@ def test_a_long_one_tells_how_far_it_is_and_stops_when_it_is_dismissed(
     assert shipped.get(job["links"]["self"] + "/results").status_code == 409
 
 
-RING = {"name": "ring", "law": "dahl", "between": ["m1", "ground"], "sigma": 5.0, "limit": 0.3}
-
-
-def smooth() -> dict[str, Any]:
-    """A scene whose peaks are not tracked: for its contacts there are no exact second derivatives."""
-    scene: dict[str, Any] = dict(solver.load_scene("two-dof").to_dict())
-    scene["contacts"] = [*scene["contacts"], RING]
-    return scene
-
-
-@each(
-    ("body", "pointers"),
-    [
-        ({"kind": "map"}, ["/scene", "/parameter", "/from", "/to"]),
-        ({**MAP, "parameter": "damper.N9"}, ["/parameter"]),
-        ({**PEAKS, "parameter": "frequency", "from": 1, "to": 2}, ["/parameter"]),
-        ({**PEAKS, "from": -1, "to": -1}, ["/from", "/to", "/to"]),
-        ({**PEAKS, "to": 60}, ["/to"]),
-        ({**PEAKS, "to": "high"}, ["/to"]),
-        ({**PEAKS, "checks": -1}, ["/checks"]),
-        ({**PEAKS, "checks": 201}, ["/checks"]),
-        ({**PEAKS, "frequency_hz": 1.0}, ["/frequency_hz"]),
-        ({**PEAKS, "set": {"damper.N0": -3}}, ["/set/damper.N0"]),
-        ({**MAP, "steps": 1}, ["/steps"]),
-        ({**MAP, "steps": 5.5, "frequencies": "many"}, ["/steps", "/frequencies"]),
-        ({**MAP, "steps": 1000, "frequencies": 501}, ["/steps"]),
-        ({**MAP, "scene": "bladed-disk", "parameter": "shroud.N0", "set": {}, "steps": 1000,
-          "frequencies": 500, "harmonics": 200, "ridge": False, "to": -1}, ["/to"]),
-        ({**MAP, "ridge": "no"}, ["/ridge"]),
-        ({**PEAKS, "scene": smooth()}, ["/scene"]),
-        ({**MAP, "scene": smooth()}, ["/ridge"]),
-        ({**ACCURACY, "frequency_hz": 0}, ["/frequency_hz"]),
-        ({**ACCURACY, "harmonics": []}, ["/harmonics"]),
-        ({**ACCURACY, "harmonics": [3, 0]}, ["/harmonics/1"]),
-        ({**ACCURACY, "harmonics": 11}, ["/harmonics"]),
-        ({**ACCURACY, "samples": [64, 66]}, ["/samples/1"]),
-        ({**ACCURACY, "repeats": 1000, "samples": [65536]}, ["/repeats"]),
-        ({**ACCURACY, "from": 1}, ["/from"]),
-        ({"kind": "campbell", "scene": "two-dof"}, ["/speeds_rpm"]),
-        ({**CAMPBELL, "speeds_rpm": []}, ["/speeds_rpm"]),
-        ({**CAMPBELL, "speeds_rpm": [60, 100]}, ["/speeds_rpm/0", "/speeds_rpm/1"]),
-        ({**CAMPBELL, "speeds_rpm": [[60, 100], [100, 110], [0, 5], [1, 1e12]]},
-         ["/speeds_rpm/2/0", "/speeds_rpm/3/1"]),
-        ({**CAMPBELL, "speeds_rpm": [[60, 100], [100, 60]]}, ["/speeds_rpm/1"]),
-        ({**CAMPBELL, "orders": []}, ["/orders"]),
-        ({**CAMPBELL, "orders": [1, 0, 1.5]}, ["/orders/1", "/orders/2"]),
-        ({**CAMPBELL, "orders": [1] * 101}, ["/orders"]),
-        ({**CAMPBELL, "band_hz": [2, 1]}, ["/band_hz"]),
-        ({**CAMPBELL, "limit": 0}, ["/limit"]),
-        ({"kind": "mistuning", "scene": "bladed-disk"}, ["/of"]),
-        ({**MISTUNING, "scene": "two-dof"}, ["/scene"]),
-        ({**MISTUNING, "of": []}, ["/of"]),
-        ({**MISTUNING, "of": ["tip", 5]}, ["/of/1"]),
-        ({**MISTUNING, "of": ["tip", "nothing", "nobody"]}, ["/of/1", "/of/2"]),
-        ({**MISTUNING, "of": "../tip"}, ["/of/0"]),
-        ({**MISTUNING, "spread": -0.1}, ["/spread"]),
-        ({**MISTUNING, "spread": 0.9}, ["/spread"]),
-        ({**MISTUNING, "samples": 0}, ["/samples"]),
-        ({**MISTUNING, "samples": 10_001}, ["/samples"]),
-        ({**MISTUNING, "scene": "bladed-disk", "samples": 10_000, "harmonics": 200}, ["/samples"]),
-        ({**MISTUNING, "seed": -1}, ["/seed"]),
-        ({**MISTUNING, "dof": "tip@1"}, ["/dof"]),
-        ({**MISTUNING, "from": 850, "to": 700}, ["/to"]),
-        ({**MISTUNING, "values": [1.0]}, ["/values"]),
-    ],
-)  # fmt: skip
-def test_a_bad_request_is_refused_where_it_is_bad(
-    shipped: httpx.Client, body: dict[str, Any], pointers: list[str]
-) -> None:
+@pytest.mark.parametrize("body", [{**PEAKS, "to": 60}, {**MAP, "steps": 1000, "frequencies": 501}])
+def test_of_what_is_refused_nothing_is_written(shipped: httpx.Client, body: dict[str, Any]) -> None:
+    """What is refused, where and with which words: tests/golden/refused.py."""
     before = job_ids(shipped)
-    problem = is_problem(shipped.post("/v1/jobs", json=body), 422)
-    assert [entry["pointer"] for entry in problem["errors"]] == pointers
-    assert all(len(entry["detail"]) > 10 for entry in problem["errors"])
-    assert job_ids(shipped) == before, "nothing is written of what is refused"
+    assert is_problem(shipped.post("/v1/jobs", json=body), 422)["errors"]
+    assert job_ids(shipped) == before
