@@ -103,7 +103,7 @@ from .scene.scene import Scene as Scene, load_scene as load_scene, shipped_scene
 from .scene.templates import new_scene as new_scene
 from .scene.tensor_springs import tensor_springs as tensor_springs
 from .sensitivity.gradient import Gradient as Gradient, Sensitivities as Sensitivities
-from .sensitivity.hessian import (
+from .sensitivity.gradient import (
     AmplitudeHessian as AmplitudeHessian,
     EdgeHessian as EdgeHessian,
     PeakHessian as PeakHessian,

@@ -5,7 +5,7 @@ Peak: at a maximum over the frequency ∂a/∂ω = 0, so its derivative by a par
 contact changes its state at the top, the two smooth pieces that meet there give it
 (`solver.sensitivity.nonsmooth`). Band edge: a(ω_e, p) = limit, so dω_e/dp = (dlimit/dp − ∂a/∂p)/(∂a/∂ω). An
 interval that ends in a fold moves with it, whatever the limit does: the ratio of both derivatives at the fold
-(`solver.continuation.bracketing`). The second derivatives are those of `solver.sensitivity.hessian`.
+(`solver.continuation.bracketing`). The second derivatives are those of `solver.sensitivity.gradient`.
 """
 
 from __future__ import annotations

@@ -10,8 +10,7 @@ from typing import Annotated
 import numpy as np
 
 from solver.jit.fourier import Integer, Real
-from solver.modes.corrector import Corrected, ModeState, correct
-from solver.modes.mode_curve import LEAST_SHARE, follow, share_of_first
+from solver.modes.mode_curve import LEAST_SHARE, Corrected, ModeState, correct, follow, share_of_first
 from solver.modes.mode_gradient import ModeSensitivities, mode_hessian
 from solver.modes.mode_start import begin, phase_of
 from solver.modes.nonlinear_mode import MOST_POINTS, ModeProblem, pose

@@ -45,12 +45,12 @@ from solver.balance.parameter_derivatives import (
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
 from solver.linear.model import dynamic_stiffness
-from solver.modes.corrector import ModeState, scales
+from solver.modes.mode_curve import ModeState, scales
 from solver.modes.mode_equations import Equations, Evaluated
 from solver.modes.mode_results import NonlinearMode
 from solver.modes.nonlinear_mode import pose
 from solver.results.told import Piece
-from solver.sensitivity.hessian import Directions, contacts_along
+from solver.sensitivity.gradient import Directions, contacts_along
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

@@ -18,7 +18,7 @@ from solver.scene.scene import Scene
 from solver.wording import listing
 
 if TYPE_CHECKING:
-    from solver.modes.corrector import ModeState
+    from solver.modes.mode_curve import ModeState
     from solver.response.contact_response import ContactState
 
 

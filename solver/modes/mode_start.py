@@ -11,7 +11,7 @@ from solver.balance.balance import Balance
 from solver.continuation.walk import Pace
 from solver.jit.fourier import Complex, Real, cosine_position
 from solver.matrices.normal_modes import hermitian, undamped_modes
-from solver.modes.corrector import Corrected, ModeState, carried_anew, correct
+from solver.modes.mode_curve import Corrected, ModeState, carried_anew, correct
 from solver.modes.mode_equations import Equations, step
 from solver.modes.mode_structure import plain
 

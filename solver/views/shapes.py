@@ -21,8 +21,7 @@ from solver.linear.model import LinearModel
 from solver.matrices.sectors.elimination import phase_factor
 from solver.matrices.sectors.outline import SectorOutline
 from solver.matrices.values import Matrix
-from solver.modes.mode_records import diameter_of
-from solver.modes.nonlinear_mode import at_nodal_diameter, pose
+from solver.modes.nonlinear_mode import at_nodal_diameter, diameter_of, pose
 from solver.response.solution import Solution
 from solver.response.time_history import all_coordinates
 from solver.scene.cyclic.annulus import written_out

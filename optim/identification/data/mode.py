@@ -27,7 +27,7 @@ from optim.identification.data.measured_table import Dimension, Table, check_mon
 from optim.problem.variables import Real
 from solver.errors import SettingError
 from solver.modes.at_amplitudes import ModePoints, mode_at_amplitudes
-from solver.modes.corrector import ModeState
+from solver.modes.mode_curve import ModeState
 from solver.modes.nonlinear_mode import at_nodal_diameter, check_mode
 from solver.scene.scene import Scene
 

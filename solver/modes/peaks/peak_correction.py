@@ -20,10 +20,9 @@ import numpy as np
 from solver.continuation.bracketing import least_between
 from solver.errors import SettingError
 from solver.jit.fourier import Complex
-from solver.modes.corrector import Corrected, ModeState, correct
+from solver.modes.mode_curve import Corrected, ModeState, correct
 from solver.modes.mode_equations import Held
-from solver.modes.mode_records import Recorder
-from solver.modes.nonlinear_mode import pose
+from solver.modes.nonlinear_mode import Recorder, pose
 from solver.results.told import Piece
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from typing import Annotated
 import numpy as np
 
 from solver.jit.fourier import Complex, Real
-from solver.modes.corrector import Corrected, ModeState, correct, scales
+from solver.modes.mode_curve import Corrected, ModeState, correct, scales
 from solver.modes.mode_equations import Evaluated
 from solver.modes.mode_gradient import ModeSensitivities
 from solver.modes.nonlinear_mode import pose

@@ -19,14 +19,14 @@ from solver.balance.contact_hessian import check_no_line
 from solver.errors import SettingError
 from solver.jit.timer import clock
 from solver.jit.fourier import Real, cosine_position
-from solver.modes.corrector import Corrected, ModeState, correct
+from solver.modes.mode_curve import Corrected, ModeState, correct
 from solver.modes.mode_curve import FollowedCurve, follow
 from solver.modes.mode_equations import Held
 from solver.modes.mode_start import slopes_at_rest
 from solver.continuation.bracketing import least_between
 from solver.response.stability.cost import left_out
 from solver.modes.nonlinear_mode import LEAST, MOST_POINTS, pose
-from solver.modes.mode_records import PointRecord, Recorder, Wider, last_unknowns, told_of
+from solver.modes.nonlinear_mode import PointRecord, Recorder, Wider, last_unknowns, told_of
 from stickslip.lab.controlled.held_result import HeldAmplitude, HeldStatus, LeastForce
 from solver.response.stability.floquet import motions_stability
 from solver.scene.parameter_paths import check_frequency

@@ -24,7 +24,7 @@ from solver.jit.fourier import Complex, Real
 from solver.modes.mode_curve import follow
 from solver.modes.mode_equations import Evaluated, Forced
 from solver.modes.nonlinear_mode import MOST_POINTS, check_amplitudes, pose
-from solver.modes.mode_records import Recorder, last_unknowns, told_of
+from solver.modes.nonlinear_mode import Recorder, last_unknowns, told_of
 from solver.modes.mode_results import NonlinearModeStatus, PhaseResonance
 from solver.modes.mode_start import begin, coordinates_of
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from solver.continuation.bracketing import closing_in
 from solver.jit.fourier import Real
-from solver.modes.corrector import Corrected, ModeState, carried_as, correct
+from solver.modes.mode_curve import Corrected, ModeState, carried_as, correct
 from solver.modes.mode_curve import BENT, border_of, by_shape, is_near, tangent_of
 from solver.modes.mode_equations import Equations
 from solver.modes.mode_results import NonlinearMode

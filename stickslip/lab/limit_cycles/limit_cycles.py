@@ -22,7 +22,7 @@ import numpy as np
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
 from stickslip.lab.limit_cycles.curve_segment import CurveSegment, points_of, with_turns, zeta_of
-from solver.modes.corrector import Corrected
+from solver.modes.mode_curve import Corrected
 from solver.modes.mode_curve import CurveEnd, follow
 from solver.modes.mode_equations import Equations
 from stickslip.lab.limit_cycles.more_harmonics_of_cycles import (
@@ -35,7 +35,7 @@ from stickslip.lab.limit_cycles.more_harmonics_of_cycles import (
 )
 from solver.modes.nonlinear_mode import MOST_POINTS, ModeProblem, pose
 from solver.modes.peaks.performance import grows_together
-from solver.modes.mode_records import PointRecord
+from solver.modes.nonlinear_mode import PointRecord
 from solver.modes.mode_results import NonlinearMode
 from solver.modes.mode_start import begin
 from solver.response.stability.cost import left_out

@@ -17,10 +17,10 @@ import numpy as np
 from solver.errors import SettingError
 from solver.jit.fourier import Complex
 from stickslip.lab.limit_cycles.curve_segment import with_turns, zeta_of
-from solver.modes.corrector import Corrected, ModeState, correct
+from solver.modes.mode_curve import Corrected, ModeState, correct
 from solver.modes.mode_curve import CurveEnd, follow, tangent_of
 from solver.modes.mode_equations import Equations
-from solver.modes.mode_records import PointRecord, Recorder, Wider
+from solver.modes.nonlinear_mode import PointRecord, Recorder, Wider
 from solver.response.stability.floquet import scene_monodromy
 from solver.scene.scene import Scene
 

@@ -8,7 +8,7 @@ import pytest
 
 import solver
 from solver.modes import sparse
-from solver.modes.corrector import scales
+from solver.modes.mode_curve import scales
 from solver.modes.mode_equations import Equations, step
 from solver.modes.nonlinear_mode import pose
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import solver
-from solver.modes.corrector import ModeState, correct
+from solver.modes.mode_curve import ModeState, correct
 from solver.modes.mode_start import begin, phase_of
 from solver.modes.nonlinear_mode import pose
 from tests.cases.matrix_cases import chain_raw

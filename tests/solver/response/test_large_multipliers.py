@@ -14,10 +14,9 @@ from solver import Scene, StoppedError, annulus, load_scene, plan, solve, stabil
 from solver.contacts.pieces.piece import Rates, StateEntry, StatePiece, steady
 from solver.jit.fourier import Real
 from solver.response.stability import monodromy as module
-from solver.response.stability.collocation import blocks_of
 from solver.response.stability.cost import forecast
 from solver.response.stability.floquet import scene_monodromy
-from solver.response.stability.monodromy import PERIOD, LinearPart, PeriodElement, monodromy
+from solver.response.stability.monodromy import PERIOD, LinearPart, PeriodElement, blocks_of, monodromy
 
 
 def maps(scene: Scene, frequency_hz: float, harmonics: int) -> tuple[Real, Real]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import solver
-from solver.modes.corrector import correct
+from solver.modes.mode_curve import correct
 from stickslip.lab.controlled.phase_resonance import Driven
 from solver.modes.nonlinear_mode import pose
 from solver.modes.mode_start import begin
