@@ -233,7 +233,7 @@ def _rigid_damper() -> Callable[[], Answer]:
     from solver import ContinuationSettings
     from solver.balance.balance import build
     from solver.balance.workspace import Workspace
-    from solver.continuation.branches.sweep import walk
+    from solver.continuation.branches.sweep import walk_branch
 
     scene = damper()
     balance, (low, high) = build(scene, harmonics=7), scene.observe.band
@@ -242,7 +242,7 @@ def _rigid_damper() -> Callable[[], Answer]:
         workspace = Workspace.of(balance)
         start = workspace.solve(balance.parameter.inside(low))
         expect("the start converges", start.converged)
-        stretches = list(walk(workspace, low, high, ContinuationSettings(), start.u))
+        stretches = list(walk_branch(workspace, low, high, ContinuationSettings(), start.u))
         expect(f"the branch ends {stretches[-1].status}", stretches[-1].status.name == "COMPLETED")
         return Answer(value=float(abs(stretches[-1].solutions[-1][:-1]).max()))
 
@@ -361,7 +361,7 @@ def _forecasts() -> Callable[[], Answer]:
     import solver
     from solver.balance.balance import build
     from solver.balance.workspace import Workspace
-    from solver.continuation.branches.sweep import walk
+    from solver.continuation.branches.sweep import walk_branch
 
     def call() -> Answer:
         off = []
@@ -373,7 +373,7 @@ def _forecasts() -> Callable[[], Answer]:
             expect(f"{scene.name}: the start converges", start.converged)
             for _ in range(2):  # the first loads what it calls
                 begun, spent, points = time.process_time(), 0.0, 0
-                for stretch in walk(workspace, low, high, solver.ContinuationSettings(), start.u):
+                for stretch in walk_branch(workspace, low, high, solver.ContinuationSettings(), start.u):
                     points += len(stretch.solutions)
                     spent = time.process_time() - begun
                     if spent > ENOUGH:

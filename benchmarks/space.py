@@ -16,7 +16,7 @@ from solver.balance.balance import build
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.residual import evaluate
 from solver.balance.workspace import Workspace
-from solver.continuation.branches.sweep import walk
+from solver.continuation.branches.sweep import walk_branch
 from solver.linear.kernels.receptance import receptance
 
 K0 = 4.0 * math.pi**2  # N/m: 1 Hz with 1 kg
@@ -160,7 +160,7 @@ def cost(case: Case) -> Cost:
         start = workspace.solve(balance.parameter.inside(low))
         expect(f"{case.name}: the start converges", start.converged)
         begun = time.process_time()
-        stretches = list(walk(workspace, low, high, ContinuationSettings(), start.u))
+        stretches = list(walk_branch(workspace, low, high, ContinuationSettings(), start.u))
         seconds = time.process_time() - begun
         expect(
             f"{case.name}: the branch ends {stretches[-1].status}", stretches[-1].status.name == "COMPLETED"

@@ -284,18 +284,34 @@ def mode_hessian(sensitivities: ModeSensitivities, state: ModeState) -> tuple[Re
 def _moves(sensitivities: ModeSensitivities, state: ModeState, at: Evaluated, inverse: Real) -> _Moves:
     """Return what each path moves: dy = −J⁻¹ ∂r, and the motion x that follows."""
     equations = sensitivities.equations
-    s, hat, size = equations.structure, equations.amplitudes, equations.size
     changes, pushes = sensitivities.changes(state, at)
     dy = -changes @ inverse.T
-    dw = dy[:, :size].reshape(-1, equations.r, equations.n)
-    forces = np.einsum("risj,psj->pri", equations.slopes(), dw)
-    total = np.array(pushes).reshape(len(dy), *at.x.shape)
-    total = total - (s.back @ np.moveaxis(hat.of(forces), 1, 2)[..., None])[..., 0]
-    total[:, s.first] += (dy[:, size] + 1j * dy[:, size + 1])[:, None] * at.dynamics.rho * at.dynamics.b
-    total -= dy[:, -2, None, None] * s.times(at.dynamics.by_omega, at.x)
-    total -= dy[:, -1, None, None] * s.times(at.dynamics.by_zeta, at.x)
+    dw = dy[:, : equations.size].reshape(-1, equations.r, equations.n)
     ports = np.array([equations.motions(one) for one in dw]).reshape(len(dy), -1, equations.n)
-    return _Moves(omega=dy[:, -2], zeta=dy[:, -1], x=at.dynamics.solve(total), ports=ports)
+    x = changed_motion(equations, state, at, dy, np.array(pushes).reshape(len(dy), *at.x.shape))
+    return _Moves(omega=dy[:, -2], zeta=dy[:, -1], x=x, ports=ports)
+
+
+def changed_motion(
+    equations: Equations, state: ModeState, at: Evaluated, dy: Real, pushes: Complex
+) -> Complex:
+    """Return dx = Z⁻¹ (dφ − Lᴴ dF − dZ x), (P, nk, N), of P changes of the unknowns and of a parameter.
+
+    Parameters
+    ----------
+    dy : (P, m) of the unknowns; pushes : (P, nk, N) by the parameter on the coordinates.
+    """
+    s, size, dynamics = equations.structure, equations.size, at.dynamics
+    w = state.y[:size].reshape(equations.r, equations.n)
+    omega, q = float(state.y[-2]), complex(state.y[size], state.y[size + 1])
+    equations.contacts(w, omega)
+    by_omega = equations.pushes_by_omega(equations.shifted_forces(w), omega, q, dynamics)
+    by_omega = by_omega - s.times(dynamics.by_omega, at.x)
+    dF = np.einsum("risj,psj->pri", equations.slopes(), dy[:, :size].reshape(-1, equations.r, equations.n))
+    phi = pushes - (s.back @ np.moveaxis(equations.amplitudes.of(dF), 1, 2)[..., None])[..., 0]
+    phi[:, s.first] += (dy[:, size] + 1j * dy[:, size + 1])[:, None] * dynamics.rho * dynamics.b
+    phi += dy[:, -2, None, None] * by_omega - dy[:, -1, None, None] * s.times(dynamics.by_zeta, at.x)
+    return dynamics.solve(phi)
 
 
 class _SecondParts:

@@ -112,7 +112,9 @@ def equilibrium(equations: Equations, omega: float) -> Real | None:
         return w
     still = s.at(omega, 0.0, s.nearest(omega, 0.0))
     A = still.receptance()[0].real
-    free = still.solve(_constant(equations, omega))[0]
+    pushed = np.zeros((s.ks.size, s.constant.size), np.complex128)
+    pushed[0] = s.constant * (s.level @ omega ** np.arange(3))
+    free = still.solve(pushed)[0]
     free = (s.contact[0] @ free).real
     for _ in range(_MOST):
         if not equations.contacts(w, omega):
@@ -129,13 +131,6 @@ def equilibrium(equations: Equations, omega: float) -> Real | None:
         w = w.copy()
         w[:, 0] += move
     return w if n else None
-
-
-def _constant(equations: Equations, omega: float) -> Complex:
-    s = equations.structure
-    phi = np.zeros((s.ks.size, s.constant.size), np.complex128)
-    phi[0] = s.constant * (s.level @ omega ** np.arange(3))
-    return phi
 
 
 def slopes_at_rest(equations: Equations, w: Real, omega: float) -> Complex | None:

@@ -290,7 +290,7 @@ class Recorder:
         return np.asarray(turn ** s.ks.astype(np.float64))
 
 
-def told_of(
+def curve_fields(
     equations: Equations, points: Sequence[Corrected], rows: Sequence[PointRecord], begun: float
 ) -> dict[str, Any]:
     """Return the fields of every `ModalCurve`."""
@@ -325,7 +325,7 @@ def collect(
         error = np.array([wider.estimate(point) for point in points])
     logs = np.array([point.state.log_amplitude for point in points], dtype=np.float64)
     return NonlinearMode(
-        **told_of(equations, points, rows, begun), mode=mode, nodal_diameter=diameter_of(scene),
+        **curve_fields(equations, points, rows, begun), mode=mode, nodal_diameter=diameter_of(scene),
         n_harmonics=balance.n_harmonics, status=NonlinearModeStatus[curve.end.name], amplitude=np.exp(logs),
         frequency_hz=frequency, damping_ratio=zeta, frequency_error=error[:, 0], damping_error=error[:, 1],
         contact_motions=np.array([row.motions for row in rows]).reshape(n, balance.n_ports, size),

@@ -27,6 +27,7 @@ from solver.balance.kernels.output import extremes
 from solver.balance.parameter import Kind
 from solver.balance.workspace import PointSolution, Workspace
 from solver.contacts.kernels.columns import MU
+from solver.continuation.bracketing import least_between
 from solver.continuation.branch import Branch, Peak
 from solver.errors import SettingError
 from solver.jit import fourier
@@ -250,22 +251,18 @@ def _mean_limits(means: WorstMean, look: tuple[Real, float]) -> Real:
 
 def _polished(means: WorstMean, values: Real, worst: Peak) -> Peak:
     """Return where most is used between the points beside the one where most is."""
-    from scipy.optimize import minimize_scalar  # loaded where it is needed
-
     below, above = values[values < worst.at], values[values > worst.at]
     ends = float(below.max(initial=values.min())), float(above.min(initial=values.max()))
-    found = [worst]
 
-    def less(at_hz: float) -> float:
+    def at(at_hz: float) -> Peak | None:
         solution = means.solved(at_hz, worst.solution)
         used = None if solution is None else means.used(solution, at_hz)
         if solution is None or used is None:
-            return -worst.value
-        found.append(Peak(value=used, at=float(at_hz), solution=solution.copy(), interior=True))
-        return -used
+            return None
+        return Peak(value=used, at=at_hz, solution=solution.copy(), interior=True)
 
-    minimize_scalar(less, bounds=ends, method="bounded", options={"xatol": _FINE * ends[1], "maxiter": _MOST})
-    return max(found, key=lambda one: one.value)
+    found = least_between(at, lambda peak: -peak.value, *ends, _FINE * ends[1], _MOST, -worst.value)
+    return worst if found is None or found.value <= worst.value else found
 
 
 class WorstMeanSlopes(Sensitivities):

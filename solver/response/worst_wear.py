@@ -141,6 +141,7 @@ class _MaximaSearch:
         self._point = evaluation_by_value(self._workspace.point)  # views: they follow the workspace
         frequency = branch.balance.parameter.kind is Kind.FREQUENCY
         fixed = frequency and not np.any(branch.balance.system.load_rise)
+        # The frequency does not change the contacts but for loads that follow it.
         self._fixed = contact_values(branch.balance.system, 0.0, 0.0) if fixed else None
         self._e = e
         self._measure = measure
@@ -258,12 +259,6 @@ class _MaximaSearch:
         # It leaves the workspace evaluated at the solution found.
         return self._node(found, tangent) if good else None
 
-    def _contacts(self, p: float) -> tuple[Real, Real, Real, Real]:
-        """Return the contacts at λ = `p`, see `contact_values`; the frequency does not change them."""
-        if self._fixed is not None:
-            return self._fixed
-        return contact_values(self._workspace.balance.system, p, 0.0)
-
     def _rated(self, value: Number, slope: Number, p: Number, dp: Number) -> tuple[Number, Number]:
         """Return a number of a period as it is or, of a power, in a second, with its slope along dλ = dp."""
         if self._measure is not Measure.FRICTION_POWER:
@@ -276,7 +271,7 @@ class _MaximaSearch:
     def _node(self, solution: Real, tangent: Real) -> _Node:
         """Measure the contact where the workspace was evaluated last."""
         balance, point, dp = self._workspace.balance, self._point, float(tangent[-1])
-        table, load, dtable, dload = self._contacts(float(solution[-1]))
+        table, load, dtable, dload = self._fixed or contact_values(balance.system, float(solution[-1]), 0.0)
         cycle = ContactCycle(
             balance=balance, U=solution[:-1].reshape(point.F.shape), F=point.F, dF_dU=point.dF_dU,
             table=table, load=load,

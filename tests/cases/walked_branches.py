@@ -9,7 +9,7 @@ from scene_cases import oscillator
 from solver import BranchStatus, ContinuationSettings, Predictor, Scene
 from solver.balance.balance import Balance, build
 from solver.balance.workspace import Workspace
-from solver.continuation.branches.sweep import Stretch, walk
+from solver.continuation.branches.sweep import Stretch, walk_branch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +36,7 @@ def with_damping(scene: Scene, path: str, damping: float, frequency_hz: float | 
 
 def walked(balance: Balance, start: float, stop: float, predictor: Predictor = Predictor.TANGENT) -> Walked:
     stretches: list[Stretch] = list(
-        islice(walk(Workspace.of(balance), start, stop, ContinuationSettings(predictor=predictor)), 20)
+        islice(walk_branch(Workspace.of(balance), start, stop, ContinuationSettings(predictor=predictor)), 20)
     )
     solutions = np.concatenate([stretch.solutions for stretch in stretches])
     return Walked(

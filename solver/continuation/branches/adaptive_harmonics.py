@@ -139,14 +139,9 @@ def _with(
 ) -> _Attempt | None:  # fmt: skip
     """Return the same response with another number of harmonics; None where Newton's method fails."""
     known = like.workspace.balance
-    if harmonics >= known.n_harmonics:
-        balance = more_harmonics(known, harmonics)
-        guess = pad(like.found.u, known, balance)
-    else:
-        balance = less_harmonics(known, harmonics)
-        guess = pad(like.found.u, known, balance)
-    workspace = Workspace.of(balance)
-    found = workspace.solve(p, guess)
+    other = more_harmonics if harmonics >= known.n_harmonics else less_harmonics
+    workspace = Workspace.of(other(known, harmonics))
+    found = workspace.solve(p, pad(like.found.u, known, workspace.balance))
     if not found.converged:
         return None
     spent = like.found.iterations + found.iterations

@@ -48,8 +48,7 @@ from solver.continuation.stretches import (
     rows_of,
     too_stiff,
 )
-from solver.continuation.walk import ContinuationSettings
-from solver.continuation.walk import walk as along
+from solver.continuation.walk import ContinuationSettings, walk
 from solver.errors import SettingError
 from solver.jit.fourier import Real, to_full
 from solver.jit.timer import clock
@@ -152,7 +151,8 @@ def _swept(
             status = stretch.status
             break
         if course.on_points is not None:
-            course.on_points(*_curve(balance, stretch))
+            values = balance.parameter.all_outside(stretch.solutions[:, -1].copy())
+            course.on_points(values, stretch.measures[:, MAX_ABS])
         if on_progress is not None:
             here = float(balance.parameter.outside(stretch.solutions[-1, -1]))
             on_progress(min(max((here - first) / (last - first), 0.0), 1.0), count)
@@ -177,7 +177,7 @@ def _swept(
 def _covering(
     workspace: Workspace, start: float, stop: float, settings: ContinuationSettings, course: Course
 ) -> Iterator[Stretch]:
-    """Yield the branch as `walk` does; what cannot be followed is solved by points where it is unique."""
+    """Yield the branch as `walk_branch`; what cannot be followed is solved by points where it is unique."""
     resume = course.resume
     begun = clock() - (0.0 if resume is None else resume.seconds)
     balance = workspace.balance
@@ -188,7 +188,7 @@ def _covering(
         before = resume
         yield resume
     else:
-        for stretch in walk(workspace, start, stop, settings, course.guess, resume):
+        for stretch in walk_branch(workspace, start, stop, settings, course.guess, resume):
             turned = rows_before_a_turn(stretch, first, last) if unique else None
             lost = unique and stretch.status in (BranchStatus.STALLED, BranchStatus.TURNED_BACK)
             if turned is None and not lost:
@@ -208,18 +208,13 @@ def _covering(
         yield from walk_by_points(workspace, before, last, abs(last - first), begun)
 
 
-def _curve(balance: Balance, stretch: Stretch) -> tuple[Real, Real]:
-    """Values in user units and amplitudes [m] of the points."""
-    return balance.parameter.all_outside(stretch.solutions[:, -1].copy()), stretch.measures[:, MAX_ABS]
-
-
 def check_limit(limit: float | None) -> None:
     """Refuse a limit of the band that is no amplitude, by a SettingError."""
     if limit is not None and not (isinstance(limit, (int, float)) and np.isfinite(limit) and limit > 0.0):
         raise SettingError("limit", limit, "must be an amplitude > 0 m")
 
 
-def walk(
+def walk_branch(
     workspace: Workspace, start: float, stop: float, settings: ContinuationSettings,
     guess: Real | None = None, resume: Stretch | None = None,
 ) -> Iterator[Stretch]:  # fmt: skip
@@ -253,7 +248,7 @@ def walk(
         code = walk_states.RUNNING if resume.status is None else walk_states.FINISHED
         yield resume
     branch = BranchStretches(workspace, control, code, state, spent, begun)
-    yield from along(branch, branch.pace)
+    yield from walk(branch, branch.pace)
 
 
 def _no_start(balance: Balance, iterations: int, begun: float, status: BranchStatus) -> Stretch:
@@ -357,7 +352,7 @@ def highest_between(balance: Balance, low: float, high: float, guess: Real) -> P
     workspace, outside = Workspace.of(balance), balance.parameter.outside
     stretches: list[Stretch] = []
     ends = float(outside(low)), float(outside(high))
-    for stretch in walk(workspace, *ends, ContinuationSettings(), guess):
+    for stretch in walk_branch(workspace, *ends, ContinuationSettings(), guess):
         stretches.append(stretch)
         if sum(len(each.solutions) for each in stretches) >= _MOST_FOLLOWED:
             break
@@ -419,5 +414,5 @@ def _until(solver: NodeSolver, last: PointRow, p: float, intervals: int) -> list
     settings = ContinuationSettings()
     settings = replace(settings, range_length=settings.range_length / intervals)
     ends = float(outside(last.at)), float(outside(p))
-    arc = joined(list(walk(solver.workspace, *ends, settings, last.solution[:-1])))
+    arc = joined(list(walk_branch(solver.workspace, *ends, settings, last.solution[:-1])))
     return solver.nodes_of(arc)[1:] if arc.status is BranchStatus.COMPLETED else []

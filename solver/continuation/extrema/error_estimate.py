@@ -140,7 +140,12 @@ class ErrorEstimator:
         tangent = self._tangent() if across else np.zeros(self._larger.balance.n_unknowns + 1)
         if before is None or tangent is None:
             return UNKNOWN
-        x = self._seen(pad(before, kept, larger.balance))
+        moved = pad(before, kept, larger.balance)
+        x = _Seen(moved, *extremes(larger.system, moved)[::2])
+        used = self._utilisation(x.high, x.low)
+        amplitude, per_motion = (
+            (max(x.high, -x.low), 1.0) if used is None else (used[0], used[1] + abs(used[2]))
+        )
         U = pad(u, kept, larger.balance)
         if self._motion(larger, U, p) is None:
             return UNKNOWN
@@ -162,12 +167,12 @@ class ErrorEstimator:
             return UNKNOWN
         largest = np.max([nearer.change, first.change, second.change], axis=0)
         first_order = second.length <= _FIRST_ORDER * first.length
-        if not (across or first_order) and largest[0] > _FIRST_ORDER * self._size(x):
+        if not (across or first_order) and largest[0] > _FIRST_ORDER * amplitude:
             largest = self._solved(x, U, p, largest)
-        changes, rounding = more * SAFETY * largest, self._per_motion(x) * rounding
+        changes, rounding = more * SAFETY * largest, per_motion * rounding
         # Changes within the rounding are rounding.
         changes = np.where(changes <= rounding, 0.0, changes) + SAFETY * of_laws
-        max_abs, half_range = changes + rounding + self._per_motion(x) * tail
+        max_abs, half_range = changes + rounding + per_motion * tail
         if kept.system.centred != FROM_REST:
             max_abs = half_range
         return ErrorEstimate(max_abs=float(max_abs), half_peak_to_peak=float(half_range))
@@ -236,24 +241,10 @@ class ErrorEstimator:
         x = self._motion(smaller, found.u, p) if found.converged else None
         return None if x is None else pad(x, less, self._larger.balance)
 
-    def _seen(self, x: Real) -> _Seen:
-        """Return observed coefficients of the larger balance with the extremes of their motion."""
-        return _Seen(x, *extremes(self._larger.system, x)[::2])
-
-    def _size(self, x: _Seen) -> float:
-        """Return the amplitude of an observed motion [m], or its utilisation."""
-        used = self._utilisation(x.high, x.low)
-        return max(x.high, -x.low) if used is None else used[0]
-
     def _utilisation(self, high: float, low: float) -> tuple[float, float, float] | None:
         """Return the utilisation of an observed stress with its derivatives; None if it is not measured."""
         system = self._workspace.balance.system
         return utilisation(system.haigh, high, low)[:3] if system.centred == UTILISED else None
-
-    def _per_motion(self, x: _Seen) -> float:
-        """Return by how much what is measured may change for a unit of the observed motion."""
-        used = self._utilisation(x.high, x.low)
-        return 1.0 if used is None else used[1] + abs(used[2])
 
     @staticmethod
     def _motion(workspace: Workspace, u: Real, p: float, *, elsewhere: bool = True) -> Real | None:

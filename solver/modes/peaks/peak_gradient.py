@@ -19,9 +19,8 @@ from typing import Annotated
 import numpy as np
 
 from solver.jit.fourier import Complex, Real
-from solver.modes.mode_curve import Corrected, ModeState, correct, scales
-from solver.modes.mode_equations import Evaluated
-from solver.modes.mode_gradient import ModeSensitivities
+from solver.modes.mode_curve import Corrected, correct, scales
+from solver.modes.mode_gradient import ModeSensitivities, changed_motion
 from solver.modes.nonlinear_mode import pose
 from solver.modes.peaks.performance import PerformanceCurve, crossing
 from solver.results.told import Piece
@@ -114,7 +113,8 @@ class _Solver:
                 return point
             here = point.state.log_amplitude
             tried.append((here, off))
-            slope = self._rise(point)
+            changes = self._changes(point, np.zeros((0, 0)))
+            slope = math.nan if changes is None else float(changes[1][0])  # ∂ ln p/∂ ln a
             if len(tried) >= 2 and tried[-1][1] != tried[-2][1]:
                 slope = (tried[-1][1] - tried[-2][1]) / (tried[-1][0] - tried[-2][0])
             if not slope or not math.isfinite(slope):
@@ -126,11 +126,6 @@ class _Solver:
             raised = point.state.scaled(self._equations.size, math.exp(to - here))
             state = replace(raised, log_amplitude=to)
         return None
-
-    def _rise(self, point: Corrected) -> float:
-        """Return ∂ ln p/∂ ln a at a point."""
-        found = self._changes(point, np.zeros((0, 0)))
-        return math.nan if found is None else float(found[1][0])
 
     def read(self, point: Corrected) -> _Reading:
         """Return ln A, ln p and what changes them."""
@@ -172,34 +167,17 @@ class _Solver:
         ----------
         rows : (n, m) ∂r/∂θ; pushes : (nk, N) each, what θ pushes on the coordinates.
         """
-        at, state, size = point.at, point.state, self._equations.size
+        at, state = point.at, point.state
         if at is None:
             return None
-        columns, reading = scales(state.y, size), self.read(point)
-        tops, forces = [], []
-        for j, change in enumerate((at.by_log_amplitude, *rows)):
-            dy = at.step(-change, columns)
-            if dy is None:
-                return None
-            dx = self._moved(state, at, dy, None if j == 0 else pushes[j - 1])
-            tops.append(float(np.sum(reading.top.conj() * dx).real))
-            force = 2.0 * float(dy[-2]) / float(state.y[-2]) + reading.by_zeta * float(dy[-1])
-            # |Qᴴ f| is that of x / a.
-            force += (2.0 if j == 0 else 0.0) - float(np.sum(reading.drive.conj() * dx).real)
-            forces.append(force)
-        return np.array(tops), np.array(forces)
-
-    def _moved(self, state: ModeState, at: Evaluated, dy: Real, pushes: Complex | None) -> Complex:
-        """Return the change of the motion (nk, N) for a change of the unknowns and of a parameter."""
-        equations, s, size = self._equations, self._equations.structure, self._equations.size
-        hat, dynamics = equations.amplitudes, at.dynamics
-        w = state.y[:size].reshape(equations.r, equations.n)
-        omega, q = float(state.y[-2]), complex(state.y[size], state.y[size + 1])
-        equations.contacts(w, omega)
-        dF = np.einsum("risj,sj->ri", equations.slopes(), dy[:size].reshape(equations.r, equations.n))
-        phi = -(s.back @ hat.of(dF).T[:, :, None])[:, :, 0]
-        phi[s.first] += dynamics.rho * dynamics.b * complex(dy[size], dy[size + 1])
-        by_omega = equations.pushes_by_omega(equations.shifted_forces(w), omega, q, dynamics)
-        phi += dy[-2] * (by_omega - s.times(dynamics.by_omega, at.x))
-        phi -= dy[-1] * s.times(dynamics.by_zeta, at.x)
-        return dynamics.solve(phi if pushes is None else phi + pushes)
+        columns, reading = scales(state.y, self._equations.size), self.read(point)
+        steps = [at.step(-change, columns) for change in (at.by_log_amplitude, *rows)]
+        if any(dy is None for dy in steps):
+            return None
+        dy, pushed = np.array(steps), np.array([np.zeros_like(at.x), *pushes])
+        dx = changed_motion(self._equations, state, at, dy, pushed)
+        tops = np.einsum("kn,pkn->p", reading.top.conj(), dx).real
+        forces = 2.0 * dy[:, -2] / float(state.y[-2]) + reading.by_zeta * dy[:, -1]
+        forces -= np.einsum("kn,pkn->p", reading.drive.conj(), dx).real
+        forces[0] += 2.0  # |Qᴴ f| is that of x / a
+        return tops, forces

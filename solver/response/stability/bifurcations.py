@@ -78,7 +78,7 @@ def bifurcations(branch: AnyBranch, *, multipliers: bool = False) -> Bifurcation
     unstable, known_by = np.zeros(count, bool), "uniqueness" if unique and count else "determinant"
     if count and not (unique and branch.reached):
         nothing = np.zeros((count, branch.balance.n_coefficients))
-        along = Along(branch.balance, Points.of(branch, observed=nothing))
+        along = BranchSigns(branch.balance, Points.of(branch, observed=nothing))
         if not unique and multipliers:
             unstable, marks, known_by = *_by_multipliers(branch, along), "multipliers"
         elif not unique:
@@ -100,7 +100,7 @@ def of_branch(branch: Branch) -> Bifurcations:
     )  # fmt: skip
 
 
-class Along:
+class BranchSigns:
     """Points along a branch with the sign of the determinant of dr/du at each of them."""
 
     def __init__(self, balance: Balance, points: Points) -> None:
@@ -128,20 +128,13 @@ class Along:
         marks = []
         for i, (left, right) in enumerate(pairwise(self.nodes)):
             if left.tangent[-1] * right.tangent[-1] < 0.0:
-                marks.append(self._fold(i, left, right))
+                fold = fold_between(partial(self.solver.between, left, right), left, right)
+                node, smooth = fold or (left, True)
+                marks.append(self.mark(MarkKind.FOLD, node, i, corner=not smooth))
             elif self.signs[i] * self.signs[i + 1] < 0.0:
-                sign = self.signs[i]
-                node = self.halved(i, partial(self._has_sign, sign), _HALVINGS)
+                node = self.halved(i, lambda node, sign=self.signs[i]: self.sign(node) == sign, _HALVINGS)
                 marks.append(self.mark(MarkKind.BRANCH_POINT, node, i))
         return tuple(marks)
-
-    def _has_sign(self, sign: float, node: PointRow) -> bool:
-        return self.sign(node) == sign
-
-    def _fold(self, i: int, left: PointRow, right: PointRow) -> Mark:
-        found = fold_between(partial(self.solver.between, left, right), left, right)
-        node, smooth = found or (left, True)
-        return self.mark(MarkKind.FOLD, node, i, corner=not smooth)
 
     def halved(self, i: int, like_the_left: Callable[[PointRow], bool], most: int) -> PointRow:
         """The last node behind point i that is like it, by halving."""
@@ -166,7 +159,7 @@ class Along:
         )  # fmt: skip
 
 
-def _by_multipliers(branch: Branch, along: Along) -> tuple[NDArray[np.bool_], tuple[Mark, ...]]:
+def _by_multipliers(branch: Branch, along: BranchSigns) -> tuple[NDArray[np.bool_], tuple[Mark, ...]]:
     """Points that are not stable, and marks of every kind."""
     found = branch_stability(branch)
     marks = list(along.by_determinant())
@@ -187,7 +180,7 @@ def _by_multipliers(branch: Branch, along: Along) -> tuple[NDArray[np.bool_], tu
     return unstable, tuple(sorted(marks, key=lambda mark: mark.after))
 
 
-def _end(branch: Branch, along: Along) -> tuple[Mark, ...]:
+def _end(branch: Branch, along: BranchSigns) -> tuple[Mark, ...]:
     """The last point, where the branch did not reach the end of the range."""
     if branch.reached or branch.status is BranchStatus.ACCURACY_NOT_REACHED:
         return ()

@@ -181,11 +181,10 @@ def _parts(scene: Scene, motions: Motions) -> dict[str, tuple[ContactPart, ...]]
         return own
     n, order = structure.sector_count, scene.engine_order
     return {
-        f"{name}@{j}": tuple(_earlier(part, PERIOD * (order * j % n) / n) for part in parts)
+        f"{name}@{j}": tuple(
+            part._replace(pieces=tuple(piece.earlier(PERIOD * (order * j % n) / n) for piece in part.pieces))
+            for part in parts
+        )
         for j in range(n)
         for name, parts in own.items()
     }
-
-
-def _earlier(part: ContactPart, turn: float) -> ContactPart:
-    return part._replace(pieces=tuple(piece.earlier(turn) for piece in part.pieces))

@@ -37,7 +37,6 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.contacts.laws.contact_law import AnyContact
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
 from solver.linear.model import LinearModel
@@ -105,7 +104,8 @@ def uniqueness(scene: Scene, frequency_hz: float) -> Uniqueness:
     if any(each is None for each in springs):
         return unknown
     centre, rest = _joined(scene, [each for each in springs if each is not None])
-    if all(_one_sided(contact) for contact in scene.contacts):
+    # What is left of a contact that opens without sliding depends on the instant alone.
+    if all(contact.OPENS and contact.friction is None for contact in scene.contacts):
         largest = _largest_gain(model, centre, rest, 2.0 * math.pi * frequency_hz)
         if largest < MARGIN:
             return Uniqueness(unique=PROVEN, ground=_BETWEEN.format(largest))
@@ -122,11 +122,6 @@ def uniqueness(scene: Scene, frequency_hz: float) -> Uniqueness:
 def monotone(scene: Scene, model: LinearModel) -> bool:
     """Whether two motions of a scene never move apart; `model` is that of the scene."""
     return all(contact.keeps_together for contact in scene.contacts) and _takes_out_power(model)
-
-
-def _one_sided(contact: AnyContact) -> bool:
-    """Whether what is left of a contact depends on the instant alone: it opens, and nothing slides."""
-    return contact.OPENS and contact.friction is None
 
 
 def _takes_out_power(model: LinearModel) -> bool:

@@ -16,7 +16,7 @@ from solver.balance.balance import build
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Branch, Peak
-from solver.continuation.branches.sweep import sweep, walk
+from solver.continuation.branches.sweep import sweep, walk_branch
 from solver.continuation.extrema.extrema import Rival, crests
 from solver.continuation.stretches import Course, Stretch
 from solver.continuation.walk import ContinuationSettings, Pace
@@ -74,7 +74,7 @@ def glance_at(
     balance = build(scene, "frequency", harmonics=harmonics, frequency_hz=None, effects=effects)
     low, high = scene.observe.band
     stretches = []
-    for stretch in walk(Workspace.of(balance), low, high, ContinuationSettings()):
+    for stretch in walk_branch(Workspace.of(balance), low, high, ContinuationSettings()):
         stretches.append(stretch)
         check()
     return Glance(

@@ -22,12 +22,12 @@ from solver.balance.balance import Balance
 from solver.scene.scene_harmonics import breaks_symmetry
 from solver.balance.workspace import PointSolution, Workspace
 from solver.continuation.branch import BranchStatus, Points
-from solver.continuation.branches.sweep import walk
+from solver.continuation.branches.sweep import walk_branch
 from solver.continuation.branch import MarkKind
 from solver.continuation.stretches import Stretch, joined
 from solver.continuation.walk import ContinuationSettings
 from solver.jit.fourier import Real, from_full, to_full
-from solver.response.stability.bifurcations import Along
+from solver.response.stability.bifurcations import BranchSigns
 from solver.response.stability.bifurcations import leaving
 
 SAME = 1e-5  # relative difference of two motions below which they are one
@@ -126,7 +126,7 @@ class SolutionSearch:
         found = self._walked(begin, stop, near.u)
         if found is None:
             return
-        along = Along(self.balance, found)
+        along = BranchSigns(self.balance, found)
         for mark in along.by_determinant():
             if mark.kind is not MarkKind.BRANCH_POINT or self.switched >= _MOST_SWITCHED:
                 continue
@@ -139,7 +139,7 @@ class SolutionSearch:
     def _walked(self, begin: float, stop: float, u: Real) -> Points | None:
         """Follow from one frequency [Hz] to another and keep what passes; None without two points."""
         stretches: list[Stretch] = []
-        for stretch in walk(self.workspace, begin, stop, ContinuationSettings(), u):
+        for stretch in walk_branch(self.workspace, begin, stop, ContinuationSettings(), u):
             stretches.append(stretch)
             if sum(len(each.solutions) for each in stretches) >= _MOST_POINTS:
                 break

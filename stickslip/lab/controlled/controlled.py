@@ -26,7 +26,7 @@ from solver.modes.mode_start import slopes_at_rest
 from solver.continuation.bracketing import least_between
 from solver.response.stability.cost import left_out
 from solver.modes.nonlinear_mode import LEAST, MOST_POINTS, pose
-from solver.modes.nonlinear_mode import PointRecord, Recorder, Wider, last_unknowns, told_of
+from solver.modes.nonlinear_mode import PointRecord, Recorder, Wider, last_unknowns, curve_fields
 from stickslip.lab.controlled.held_result import HeldAmplitude, HeldStatus, LeastForce
 from solver.response.stability.floquet import motions_stability
 from solver.scene.parameter_paths import check_frequency
@@ -148,7 +148,8 @@ def _collect(
     frequency, z = last_unknowns(points)
     stable, unknown = _stable(equations, frequency, z, rows, unknown)
     return HeldAmplitude(
-        **told_of(equations, points, rows, begun), held=equations.target, n_harmonics=balance.n_harmonics,
+        **curve_fields(equations, points, rows, begun), held=equations.target,
+        n_harmonics=balance.n_harmonics,
         status=HeldStatus[curve.end.name], frequency_hz=frequency, excitation=z * equations.unit,
         excitation_error=error * equations.unit,
         phase_deg=np.degrees(np.angle(observed[:, 1] - 1j * observed[:, 2])),

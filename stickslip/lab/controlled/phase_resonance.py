@@ -24,7 +24,7 @@ from solver.jit.fourier import Complex, Real
 from solver.modes.mode_curve import follow
 from solver.modes.mode_equations import Evaluated, Forced
 from solver.modes.nonlinear_mode import MOST_POINTS, check_amplitudes, pose
-from solver.modes.nonlinear_mode import Recorder, last_unknowns, told_of
+from solver.modes.nonlinear_mode import Recorder, last_unknowns, curve_fields
 from solver.modes.mode_results import NonlinearModeStatus, PhaseResonance
 from solver.modes.mode_start import begin, coordinates_of
 
@@ -96,7 +96,7 @@ def phase_resonance(
     amplitude = np.exp(np.array([point.state.log_amplitude for point in points], dtype=np.float64))
     frequency, z = last_unknowns(points)
     return PhaseResonance(
-        **told_of(equations, points, [recorder.of(point) for point in points], begun), mode=int(mode),
+        **curve_fields(equations, points, [recorder.of(point) for point in points], begun), mode=int(mode),
         status=NonlinearModeStatus[curve.end.name], amplitude=amplitude, frequency_hz=frequency,
         excitation=z * equations.unit * amplitude,
     )  # fmt: skip

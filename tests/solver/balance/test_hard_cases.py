@@ -22,7 +22,7 @@ from solver.balance.balance import build
 from solver.balance.kernels.output import RESIDUAL
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.stick_slip_events import LIFTING
-from solver.continuation.branches.sweep import walk
+from solver.continuation.branches.sweep import walk_branch
 from solver.continuation.stretches import Course
 from solver.marching.march_result import MarchStatus
 
@@ -213,7 +213,7 @@ def test_an_isolated_branch_is_reached():
 
 def closed(workspace: Workspace, start: float, stop: float, guess: np.ndarray) -> Walked:
     """Half of a closed curve: from one of its points until the branch is back at that frequency."""
-    stretches = list(islice(walk(workspace, start, stop, ContinuationSettings(), guess.copy()), 20))
+    stretches = list(islice(walk_branch(workspace, start, stop, ContinuationSettings(), guess.copy()), 20))
     solutions = np.concatenate([stretch.solutions for stretch in stretches])
     return Walked(
         status=stretches[-1].status,

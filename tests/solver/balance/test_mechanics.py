@@ -17,7 +17,7 @@ from solver.balance.balance import build
 from solver.balance.kernels.mechanics import ALLOWED, unaccounted
 from solver.balance.kernels.output import LOST
 from solver.balance.workspace import Workspace
-from solver.continuation.branches.sweep import walk
+from solver.continuation.branches.sweep import walk_branch
 from solver.continuation.stretches import balanced_part
 from solver.response.solve import describe, described_at
 
@@ -77,7 +77,7 @@ def test_every_point_of_a_branch_is_judged() -> None:
 def test_a_point_that_fails_is_none_of_the_branch() -> None:
     scene, _, harmonics = random_scene(3)
     workspace = Workspace.of(build(scene, harmonics=harmonics))
-    stretch = next(walk(workspace, *scene.observe.band, ContinuationSettings()))
+    stretch = next(walk_branch(workspace, *scene.observe.band, ContinuationSettings()))
     assert balanced_part(workspace, stretch) is stretch
     stretch.measures[2, LOST] = 10.0 * ALLOWED
     cut = balanced_part(workspace, stretch)

@@ -23,7 +23,7 @@ from solver.balance.kernels.output import LOST
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import UNHELD
 from solver.continuation.branches.point_by_point import walk_by_points
-from solver.continuation.branches.sweep import walk
+from solver.continuation.branches.sweep import walk_branch
 from solver.continuation.stretches import balanced_part, joined
 from solver.linear.condensation import loose_motions
 from solver.marching.march_result import MarchStatus
@@ -250,7 +250,7 @@ def test_the_rest_of_a_branch_by_points():
         branch = sweep(scene, start=start, stop=stop, harmonics=5)
         workspace, inside = Workspace.of(branch.balance), branch.balance.parameter.inside
         ends = float(inside(start)), float(inside(stop))
-        first = next(walk(workspace, start, stop, ContinuationSettings())).first(1)
+        first = next(walk_branch(workspace, start, stop, ContinuationSettings())).first(1)
         rest = joined(list(walk_by_points(workspace, first, ends[1], ends[1] - ends[0], 0.0)))
         assert rest.status is branch.status
         last = float(branch.balance.parameter.outside(rest.solutions[-1, -1]))
@@ -262,7 +262,7 @@ def test_a_branch_ends_before_a_mean_force_drives_a_part():
     """A point whose mean forces do not balance is no point of a branch, however small its residual."""
     scene = pulled(two_blades(), "b1", 30.0)
     workspace = Workspace.of(build(scene, harmonics=5))
-    found = next(walk(workspace, 250.0, 300.0, ContinuationSettings()))
+    found = next(walk_branch(workspace, 250.0, 300.0, ContinuationSettings()))
     assert balanced_part(workspace, found) is found
     told = found.measures[:7, LOST].copy()
     # Far away, the contacts' mean forces are lost in the rounding of where the part stands.

@@ -26,7 +26,7 @@ from solver import (
 from solver.balance.balance import Balance, build
 from solver.balance.workspace import Workspace
 from solver.contacts.pieces.piece import StatePiece, spring
-from solver.continuation.branches.sweep import walk
+from solver.continuation.branches.sweep import walk_branch
 from solver.jit.fourier import to_full
 from solver.linear.assembly import linear_model
 from solver.marching.kernels import taylor as kernel
@@ -142,7 +142,7 @@ def branch_points(damping: float, start: float, stop: float, harmonics: int) -> 
     """Every point of a branch of the oscillator with negative damping."""
     balance = with_damping(damping, harmonics)
     workspace, points = Workspace.of(balance), []
-    for stretch in islice(walk(Workspace.of(balance), start, stop, ContinuationSettings()), 20):
+    for stretch in islice(walk_branch(Workspace.of(balance), start, stop, ContinuationSettings()), 20):
         for row in stretch.solutions:
             _, evaluation = workspace.evaluate(row[:-1].copy(), float(row[-1]))
             frequency_hz = float(row[-1]) / PERIOD

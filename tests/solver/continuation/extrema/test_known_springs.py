@@ -9,7 +9,7 @@ import solver
 from solver.balance.balance import build
 from solver.balance.known_springs import MOST_ENTRIES
 from solver.balance.workspace import Workspace
-from solver.continuation.branches.sweep import walk
+from solver.continuation.branches.sweep import walk_branch
 from solver.continuation.extrema.nodes import NodeSolver
 from solver.continuation.stretches import joined
 from solver.jit.fourier import Real
@@ -26,7 +26,8 @@ def test_springs_of_a_walk_are_those_worked_out_anew() -> None:
     low, high = balance.scene.observe.band
     workspace, again = Workspace.of(balance), Workspace.of(balance)
     middle = 0.5 * (low + high)
-    points = joined(list(walk(workspace, middle, middle + 0.1 * (high - low), solver.ContinuationSettings())))
+    stop = middle + 0.1 * (high - low)
+    points = joined(list(walk_branch(workspace, middle, stop, solver.ContinuationSettings())))
     assert all(springs is not None for springs in workspace.springs.of(points.solutions))
     assert again.springs.of(points.solutions)[0] is None
     found = []
