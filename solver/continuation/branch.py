@@ -494,6 +494,13 @@ class Branch(AnyBranch):
         """The balance."""
         return self.balance
 
+    def scene_at(self, value: float) -> tuple[Scene, float]:
+        """Return the scene and the frequency [Hz] of the responses at a value of the parameter."""
+        if self.parameter == "frequency":
+            return self.scene.at_frequency(value), value
+        scene = self.scene.with_values({self.parameter: value})
+        return scene, self.balance.system.omega / (2.0 * math.pi)
+
     @property
     def coefficients(self) -> Real:
         """Slip motion of every contact at each point, (P, n_contacts, n) [m]."""

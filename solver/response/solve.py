@@ -184,12 +184,8 @@ def described_at(branch: Branch, i: int) -> Solution:
 
 def _described(branch: Branch, at: float, u: Real) -> Solution:
     """Return the response `u` at a value of a branch's parameter, without its error estimate."""
-    balance, scene, frequency_hz = branch.balance, branch.balance.scene, at
+    balance, (scene, frequency_hz) = branch.balance, branch.scene_at(at)
     if balance.parameter.kind is not Kind.FREQUENCY:
-        scene, frequency_hz = (
-            scene.with_values({branch.parameter: at}),
-            balance.system.omega / (2.0 * math.pi),
-        )
         effects = replace(balance.effects, even_harmonics=int(balance.system.ks[0]) == 0)
         balance = build(scene, harmonics=balance.n_harmonics, effects=effects)
     found = PointSolution(converged=True, u=u, iterations=0, residual=0.0)

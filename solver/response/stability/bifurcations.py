@@ -307,7 +307,7 @@ def _followed(branch: Branch, beside: Real, place: Real, settings: ContinuationS
     low, high = sorted((branch.start, branch.stop))
     at = float(balance.parameter.outside(float(beside[-1])))
     onward = high if beside[-1] >= place[-1] else low
-    hertz = None if branch.parameter == "frequency" else balance.system.omega / (2.0 * math.pi)
+    hertz = None if branch.parameter == "frequency" else branch.scene_at(at)[1]
     return sweep(
         balance.scene, branch.parameter, min(max(at, low), high), onward, harmonics=balance.n_harmonics,
         frequency_hz=hertz, settings=settings, effects=balance.effects,

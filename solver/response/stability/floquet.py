@@ -93,11 +93,7 @@ def branch_stability(
         coefficients = solution.reshape(-1, balance.n_coefficients)
         every = fourier.to_full(coefficients, balance.system.ks, balance.highest_harmonic)
         motions = tuple(np.split(every, balance.system.first_port[1:-1]))
-        if branch.parameter == "frequency":
-            found.append(motions_stability(balance.scene.at_frequency(value), value, motions))
-        else:
-            scene = balance.scene.with_values({branch.parameter: value})
-            found.append(motions_stability(scene, balance.system.omega / PERIOD, motions))
+        found.append(motions_stability(*branch.scene_at(value), motions))
     return tuple(found)
 
 

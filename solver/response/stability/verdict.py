@@ -61,12 +61,7 @@ def of_peaks(branch: Branch) -> tuple[Verdict, ...]:
     found: list[Verdict] = []
     left = CHEAP
     for peak in branch.peaks:
-        by_frequency = branch.parameter == "frequency"
-        scene = branch.balance.scene
-        scene = (
-            scene.at_frequency(peak.at) if by_frequency else scene.with_values({branch.parameter: peak.at})
-        )
-        hertz = peak.at if by_frequency else branch.balance.system.omega / (2.0 * math.pi)
+        scene, hertz = branch.scene_at(peak.at)
         known = _without_multipliers(scene, hertz)
         if known is None:
             left -= forecast(scene, hertz)
