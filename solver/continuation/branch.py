@@ -1,4 +1,7 @@
-"""Branches: what continuation returns. Only converged points are in them."""
+"""Branches: what continuation returns, with peaks, bands, marks and what is certain of them.
+
+Only converged points are in them.
+"""
 
 from __future__ import annotations
 
