@@ -21,7 +21,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
-_NO_CODE = ("compiler_process", "folder", "parallel", "timer", "way")
+_NO_CODE = ("compiler_process", "eigen", "folder", "parallel", "timer", "way")
 """Modules of this folder that the machine code does not depend on."""
 
 

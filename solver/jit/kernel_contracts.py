@@ -1,7 +1,7 @@
 """Contracts of kernels called by number: their types, and how Python calls them where machine code does not.
 
 In the plain way, which asks Numba for what it documents alone, so that a new Numba cannot strand us, a kernel
-calls them through Python; interpreted, everything is Python. `solver.jit.kernel_tables` is the compiled way.
+calls them through Python; interpreted, everything is Python. `solver.jit.slots` is the compiled way.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Kernels:
 
 
 def numbered(arguments: tuple[Form, ...], result: Form, known: tuple[str, ...] = ()) -> Any:
-    """Make the function it decorates the contract of kernels called by number, see `kernel_tables`."""
+    """Make the function it decorates the contract of kernels called by number, see `solver.jit.slots`."""
     del arguments  # Python asks for no types
     kernels = Kernels(known)
     if WAY is Way.INTERPRETED:

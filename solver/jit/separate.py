@@ -1,4 +1,4 @@
-"""Kernels compiled on their own (`solver.jit.slots`), or called by numbers (`solver.jit.kernel_tables`).
+"""Kernels compiled on their own, or called by numbers, see `solver.jit.slots`.
 
 In the plain way the first are as all others, and Python calls the second; interpreted, all are Python.
 """
@@ -8,8 +8,7 @@ from __future__ import annotations
 from solver.jit.way import WAY, Way
 
 if WAY is Way.COMPILED:
-    from solver.jit.kernel_tables import numbered
-    from solver.jit.slots import apart
+    from solver.jit.slots import apart, numbered
 else:
     from solver.jit.decorators import compiled as apart
     from solver.jit.kernel_contracts import numbered

@@ -26,8 +26,6 @@ KT_SECOND = OWN + 2
 K_GAP, GAP = OWN, OWN + 1
 # Polynomial spring: a_1, a_2, … [N/m^j]
 A_1, MOST_DEGREE = OWN, MOST_OWN
-# Where the force is found by samples in time: samples a period.
-SAMPLES = OWN
 
 
 def wave_column(order: int) -> int:
@@ -44,7 +42,6 @@ KERNELS = (
     "solver.contacts.kernels.coulomb.line_law:coulomb_line",
     "solver.contacts.kernels.springs:gap_spring",
     "solver.contacts.kernels.springs:polynomial_spring",
-    "solver.contacts.kernels.coulomb.line_law:coulomb_sampled",
     "solver.contacts.kernels.circle.circle_law:coulomb_circle",
     "solver.contacts.kernels.coulomb.line_law:coulomb_box",
     "solver.contacts.kernels.history.history_law:history_law",

@@ -178,11 +178,6 @@ class AnyContact(Element, InSpace):
         return self.SECOND
 
     @property
-    def sampled_kernel(self) -> str | None:
-        """The kernel that takes as many samples of a period as `columns.SAMPLES` says instead, if any."""
-        return None
-
-    @property
     def stiffnesses(self) -> tuple[float, ...]:
         """A stiffness of each relative motion [N/m]: what holds it when the contact is closed and stuck."""
         return (0.0,) * len(self.end_keys)

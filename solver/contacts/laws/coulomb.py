@@ -49,11 +49,6 @@ class Contact(SlidesOnALine):
     N0: NonNegative
 
     @property
-    def sampled_kernel(self) -> str:
-        """The kernel that samples motion and load instead."""
-        return "solver.contacts.kernels.coulomb.line_law:coulomb_sampled"
-
-    @property
     def evaluation(self) -> str:
         """How its force is found, in the words of a plan."""
         return "elastic Coulomb friction under a given load: closed form"

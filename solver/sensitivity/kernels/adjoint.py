@@ -31,7 +31,7 @@ from solver.jit.fourier import Complex, Integer, Real, coefficient_count, cosine
 from solver.jit.separate import apart
 from solver.linear.kernels.receptance import forget, receptance
 
-# Entries of `by`: for each element the slopes by kt, mu and its load, then those of the linear part.
+# Entries of `by`: for each element the slopes by kt, μ and its load, then those of the linear part.
 BY_KT, BY_MU, BY_LOAD = 0, 1, 2
 BY_OMEGA, BY_LEVEL, BY_PHASE, BESIDES = 0, 1, 2, 3
 # Columns of the extremes.
@@ -251,7 +251,7 @@ def _by_contacts(
     system: System, u: Real, omega: float, point: Evaluation, wanted: Integer, count: int, weights: Real,
     by: Real,
 ) -> None:  # fmt: skip
-    """Fill w·∂F/∂kt, w·∂F/∂mu and w·∂F/∂N of the Jenkins elements asked for."""
+    """Fill w·∂F/∂kt, w·∂F/∂μ and w·∂F/∂N of the Jenkins elements asked for."""
     n, each = coefficient_count(system.ks), per_element(system)
     table, load, _, _ = contact_values(system, omega, 0.0)
     for e in range(system.laws.size):

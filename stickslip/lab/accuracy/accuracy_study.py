@@ -16,7 +16,6 @@ from solver.balance.balance import Balance, build, check_harmonics
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.more_harmonics import more_harmonics, pad
 from solver.balance.workspace import Workspace
-from solver.contacts.kernels.columns import SAMPLES as SAMPLES_COLUMN
 from solver.contacts.kernels.laws import law_number
 from solver.continuation.branch import Branch
 from solver.continuation.branches.sweep import sweep
@@ -29,6 +28,7 @@ from solver.results.watch import ShouldStop, shows_progress
 from solver.scene.scene_harmonics import kept_harmonics
 from solver.scene.parameter_paths import check_frequency
 from solver.scene.scene import Scene
+from stickslip.lab.accuracy.kernels import aft
 from stickslip.lab.accuracy.accuracy_result import AccuracyRow, AccuracyStatus, AccuracyStudy
 
 CLOSED_FORM, SAMPLED, EXACT = "closed form", "sampled", "exact"
@@ -147,8 +147,8 @@ def sampled(balance: Balance, samples: int) -> Balance:
     system, contacts = balance.system, balance.scene.contacts
     laws, table = system.laws.copy(), system.contacts.copy()
     for e, contact in enumerate(contacts):
-        if contact.sampled_kernel is not None:
-            laws[e], table[e, SAMPLES_COLUMN] = law_number(contact.sampled_kernel), samples
+        if contact.JENKINS:
+            laws[e], table[e, aft.SAMPLES] = law_number(f"{aft.__name__}:coulomb_sampled"), samples
     return replace(balance, system=system._replace(samples=samples, laws=laws, contacts=table))
 
 

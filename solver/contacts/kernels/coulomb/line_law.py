@@ -24,8 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.contacts.kernels.columns import C_STICK, KN, KT, KT_SECOND, MU, OMEGA, PRESTRESSED, SAMPLES
-from solver.contacts.kernels.coulomb.aft import sampled_force
+from solver.contacts.kernels.columns import C_STICK, KN, KT, KT_SECOND, MU, OMEGA, PRESTRESSED
 from solver.contacts.kernels.coulomb.line_force import add_moments, contact_force, products
 from solver.contacts.kernels.stick_slip_events import FAILED, LIFTING, SEPARATED, piece_of
 from solver.jit.decorators import compiled
@@ -117,7 +116,7 @@ def press(
 
 
 @compiled
-def _along_parameter(
+def along_parameter(
     dkt: float, dmu: float, dN: Real, by_kt: Real, by_mu: Real, by_N: Real, dF_dp: Real
 ) -> None:
     """Fill the derivative of a force by λ from those by kt, μ and the load."""
@@ -159,7 +158,7 @@ def _rub(
             return FAILED, 0
         # Under one load: separated or lifting both, else slipping where one slips.
         together, piece = max(together, state), _PIECES * piece + piece_of(segments, count)
-        _along_parameter(slope[column], slope[MU], dN, by_kt, by_mu, by_N, dF_dp[a])
+        along_parameter(slope[column], slope[MU], dN, by_kt, by_mu, by_N, dF_dp[a])
         for b in range(m):
             if b != a:
                 fill_block(dF_dU[a * m + b], 0.0)
@@ -198,22 +197,6 @@ def coulomb_box(
     return _rub(
         2, KT_SECOND, U, ks, load, load_ks, row, slope, dload, cos_table, sin_table, segments, F, dF_dU, dF_dp
     )
-
-
-@apart
-def coulomb_sampled(
-    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
-    cos_table: Real, sin_table: Real, segments: Records, F: Real, dF_dU: Real, dF_dp: Real,
-) -> tuple[int, int]:  # fmt: skip
-    """Fill the friction along one line under a given load by `row[SAMPLES]` samples of a period instead."""
-    n = U.shape[1]
-    by_kt, by_mu, by_N = np.empty(n), np.empty(n), np.empty((n, load.size))
-    state, count = sampled_force(
-        U[0], ks, load, load_ks, row[KT], row[MU], int(row[SAMPLES]), segments, dF_dU[0], by_kt, by_mu, by_N,
-        F[0],
-    )  # fmt: skip
-    _along_parameter(slope[KT], slope[MU], dload, by_kt, by_mu, by_N, dF_dp[0])
-    return state, piece_of(segments, count)
 
 
 @apart

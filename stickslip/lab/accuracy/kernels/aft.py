@@ -16,6 +16,7 @@ import math
 
 import numpy as np
 
+from solver.contacts.kernels.columns import KT, MU, OWN
 from solver.contacts.kernels.coulomb.line_force import basis_at, moment_rows, products
 from solver.contacts.kernels.stick_slip_events import (
     AFTER_SEPARATION,
@@ -28,13 +29,16 @@ from solver.contacts.kernels.stick_slip_events import (
     STICK,
     STUCK,
     UNLOADED,
+    piece_of,
 )
+from solver.contacts.kernels.coulomb.line_law import along_parameter
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count
 from solver.jit.kernel_records import Records
 from solver.jit.lapack import dot, fill, fill_block
 from solver.jit.separate import apart
 
+SAMPLES = OWN  # column of the contact table: samples a period
 # What a contact does at a sample.
 _OPEN, _STICKS, _SLIPS_UP, _SLIPS_DOWN = 0, 1, 2, 3
 _MOST_PERIODS = 10
@@ -272,3 +276,19 @@ def sampled_force(
     for i in range(n):
         F[i] = kt * dF_dkt[i] + mu * dF_dmu[i]
     return state, count
+
+
+@apart
+def coulomb_sampled(
+    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
+    cos_table: Real, sin_table: Real, segments: Records, F: Real, dF_dU: Real, dF_dp: Real,
+) -> tuple[int, int]:  # fmt: skip
+    """Fill the friction along one line under a given load by `row[SAMPLES]` samples of a period instead."""
+    n = U.shape[1]
+    by_kt, by_mu, by_N = np.empty(n), np.empty(n), np.empty((n, load.size))
+    state, count = sampled_force(
+        U[0], ks, load, load_ks, row[KT], row[MU], int(row[SAMPLES]), segments, dF_dU[0], by_kt, by_mu, by_N,
+        F[0],
+    )  # fmt: skip
+    along_parameter(slope[KT], slope[MU], dload, by_kt, by_mu, by_N, dF_dp[0])
+    return state, piece_of(segments, count)

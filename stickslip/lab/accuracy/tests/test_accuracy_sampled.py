@@ -15,11 +15,11 @@ from solver.balance.balance import build
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels import stick_slip_events as events
-from solver.contacts.kernels.coulomb.aft import sampled_force
+from stickslip.lab.accuracy.kernels.aft import sampled_force
 from solver.jit import fourier
 from stickslip.lab.accuracy.accuracy_study import sampled
 
-REFERENCE = json.loads((Path(__file__).parent.parent.parent / "data" / "contact_force.json").read_text())
+REFERENCE = json.loads((Path(__file__).parents[4] / "tests" / "data" / "contact_force.json").read_text())
 NAMES = [name for name in REFERENCE if name != "about"]
 
 

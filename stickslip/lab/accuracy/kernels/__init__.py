@@ -1,0 +1,1 @@
+"""The force by samples in time, compiled."""
