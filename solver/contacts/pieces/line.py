@@ -57,7 +57,8 @@ def line_lasts(
 
 def line_left(direction: Any, kt: float, u: _Line, limit: _Line) -> _Line:
     """Return where a slip leaves the slider that it moves, w = u − ξΛ/kt."""
-    return u - direction * limit / kt
+    left: _Line = u - direction * limit / kt
+    return left
 
 
 class Segments(NamedTuple):
