@@ -8,6 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import earlier_revisions
 import httpx
 import pytest
 from postgresql_cluster import Cluster, binaries
@@ -30,6 +31,13 @@ def cluster() -> Iterator[Cluster]:
         pytest.skip("PostgreSQL's server is not installed (Debian's package `postgresql`)")
     with Cluster(programs) as running:
         yield running
+
+
+@pytest.fixture
+def earlier() -> Iterator[None]:
+    """Databases go by the revisions of before the first release."""
+    with earlier_revisions.known():
+        yield
 
 
 @pytest.fixture

@@ -4,25 +4,29 @@ import json
 import random
 import time
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
+import sqlalchemy as sa
+from alembic import command
 from service_helpers import analyse, in_order, is_problem, listed, within
-from sqlalchemy import insert
+from sqlalchemy import Connection, func, insert, inspect, select
 
 import optim
 import solver
 from service.client.client import Client
+from service.db import revisions
 from service.db.clock import new_id, utc_now
-from service.db.engine import Database
-from service.db.models import Job, JobState
+from service.db.engine import Database, migrating
+from service.db.models import Job, JobState, TableBase
 from service.db.repositories import ResultRepository
 from service.db.repositories.result_repository import insert_results
 from service.errors import InvalidRequestError
 from service.jobs.common.sweep_records import design_record
-from service.jobs.stored_figures import DesignRecord, VariableValues
+from service.jobs.stored_figures import DESIGN, DesignRecord, VariableValues
 from service.jobs.strict_json import validated
 from service.schemas.answers import DesignDetail
 from service.schemas.result_queries import DesignQuery, design_page
@@ -229,6 +233,83 @@ def test_a_design_that_breaks_its_limit_is_stored_as_that() -> None:
     record = design_record(result)
     assert (record.reached, record.feasible) == (False, False)
     assert record.variables[0].value == result.optimum["damper.N0"]
+
+
+OLD = {
+    "scene": "two-dof", "optimum": {"damper.N0": 104.5}, "peak": {"value": 2.35, "at": 1.04},
+    "peaks": [{"value": 2.35, "at": 1.04}], "band_hz": 0.2, "limit": 1.66, "evaluations": 9, "seconds": 0.4,
+    "active": ["peak at 1.04 Hz"], "multipliers": [1.0], "optimality": 1e-9, "reached": True,
+    "status": "The highest peak can not be lowered further within the bounds.",
+}  # fmt: skip
+
+
+_result = TableBase.metadata.tables["job_result"]
+_LATER = {"owner", "seconds_limit"}  # columns that the first revision had not
+_job = sa.table(
+    "job",
+    *(sa.column(c.name, c.type) for c in TableBase.metadata.tables["job"].columns if c.name not in _LATER),
+)
+BEGIN = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
+END = BEGIN + timedelta(seconds=1.5)
+
+
+def old_job(
+    connection: Connection, name: str, kind: str, spec: dict[str, Any], body: dict[str, Any] | None,
+    finished: datetime | None = END,
+) -> None:  # fmt: skip
+    state = JobState.SUCCESSFUL if body is not None else JobState.DISMISSED
+    connection.execute(
+        insert(_job).values(
+            id=name, kind=kind, state=state, scene_name="two-dof", scene_hash="abc", spec_hash="",
+            request_hash="", attempt=1, max_attempts=3, progress=1.0,
+            priority=0, points=0, cancel_requested=False, created=BEGIN, finished=finished,
+            request={}, spec=spec,
+        )
+    )  # fmt: skip
+    if body is not None:
+        connection.execute(insert(_result).values(job_id=name, body=body))
+
+
+@pytest.mark.usefixtures("earlier")
+@pytest.mark.few(2)
+def test_the_designs_of_an_old_database_are_filled_in_and_can_be_taken_back(url: str) -> None:
+    revisions.upgrade(url, "0001")
+    spec = {"variables": {"damper.N0": [20.0, 1000.0]}, "limit": None, "max_band_hz": None, "harmonics": 7}
+    new = {**OLD, "method": "ipopt", "objective": 3.5, "work": 14.0, "conditions": {"violation": 0.0}}
+    with migrating(url) as connection:
+        old_job(connection, "a", "design", spec, OLD)
+        old_job(connection, "b", "design", {**spec, "max_band_hz": 0.1}, {**OLD, "reached": False})
+        old_job(connection, "c", "design", spec, {**OLD, "optimum": {}, "peak": None, "reached": False})
+        old_job(connection, "d", "design", spec, None)
+        old_job(connection, "e", "sweep", {}, {"points": 3})
+        old_job(connection, "f", "design", {**spec, "max_band_hz": 0.1}, new)
+        for number in range(450):
+            old_job(connection, f"g{number:03d}", "design", spec, OLD, None)
+    assert revisions.upgrade(url) == revisions.head_revision()
+    database = Database(url)
+    repository = ResultRepository(database)
+    rows = {row.job_id: row for row, _ in repository.page(DesignQuery().to_filter(DESIGN), 1000)}
+    variables = {name: list(row.variables) for name, row in rows.items()}
+    database.close()
+    assert len(rows) == 4 + 450
+    first = rows["a"]
+    assert (first.method, first.objective, first.peak, first.peak_at) == ("minimax", 2.35, 2.35, 1.04)
+    assert (first.harmonics, first.evaluations, first.scene_hash) == (7, 9, "abc")
+    assert first.created.isoformat() == "2026-01-02T03:04:06.500000+00:00"
+    assert rows["g449"].created.isoformat() == "2026-01-02T03:04:05+00:00"
+    assert variables["a"] == [VariableValues(name="damper.N0", value=104.5, low=20.0, high=1000.0)]
+    assert [rows[name].feasible for name in "abcf"] == [True, False, False, True]
+    assert (rows["c"].peak, variables["c"][0].value) == (None, None)
+    assert (rows["f"].method, rows["f"].objective, rows["f"].work) == ("ipopt", 3.5, 14.0)
+
+    config = revisions._config()
+    with migrating(url) as connection:
+        config.attributes["connection"] = connection
+        command.downgrade(config, "0001")
+    with migrating(url) as connection:
+        assert not set(inspect(connection).get_table_names()) & {"design", "design_variable"}
+        assert connection.execute(select(func.count()).select_from(_result)).scalar_one() == 455
+    assert revisions.upgrade(url) == revisions.head_revision()
 
 
 @pytest.mark.long

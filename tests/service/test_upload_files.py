@@ -17,11 +17,12 @@ import pytest
 import sqlalchemy as sa
 from service_helpers import is_problem, stored_upload
 from sqlalchemy import event
+from test_migrations import contents, down
 from upload_cases import npz, upload
 
 from service.db import revisions
 from service.db.clock import new_id, utc_now
-from service.db.engine import Database, backup, is_sqlite
+from service.db.engine import Database, backup, is_sqlite, migrating
 from service.db.models import Upload, UploadPiece
 from service.db.repositories import UploadRepository
 from service.db.repositories.integrity import check
@@ -134,6 +135,30 @@ def test_the_folder_of_a_process_that_was_killed_goes_at_once(
         process.communicate("")
     files.sweep(utc_now() - timedelta(days=2))
     assert not folder.exists()
+
+
+@pytest.mark.usefixtures("earlier")
+def test_what_an_older_version_stored_is_moved_and_moved_back(url: str) -> None:
+    revisions.upgrade(url, "0012")
+    held = {new_id(): data for data in (LARGE, b"abc", b"")}
+    with migrating(url) as connection:
+        table = sa.Table("upload", sa.MetaData(), autoload_with=connection)
+        for one, data in held.items():
+            values = {"id": one, "size": len(data), "sha256": hashlib.sha256(data).hexdigest(), "data": data}
+            connection.execute(sa.insert(table).values(created=utc_now(), **values, **SAID))
+    before = contents(url, ("upload",))
+    revisions.upgrade(url)
+    database = Database(url)
+    try:
+        pieces = UploadRepository(database).files.pieces
+        assert {one: b"".join(pieces(one)) for one in held} == held
+    finally:
+        database.close()
+    assert check(url).sound
+    down(url, "0012")
+    assert contents(url, ("upload",)) == before
+    revisions.upgrade(url)
+    assert check(url).sound
 
 
 def test_a_backup_has_the_files_and_the_check_reads_them(tmp_path: Path) -> None:
