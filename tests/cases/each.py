@@ -15,7 +15,7 @@ def each(
     Fixtures are shared by the cases. Cases that take time to find are given by a function, which the test
     calls: every process collects.
     """
-    named = names.split(",") if isinstance(names, str) else names
+    named = names.replace(",", " ").split() if isinstance(names, str) else names
     given = cases if inspect.isfunction(cases) else list(cases)  # type: ignore[arg-type]
 
     def decorated(check: Callable[..., None]) -> Callable[..., None]:

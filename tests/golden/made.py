@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any
 
 from service.jobs.strict_json import digest
 from service.rendering.docs_tables import SOURCES, TABLES
-from tests.golden.faces import Studies, helped, paths
+from tests.golden.faces import DATA, Studies, asked, helped, paths, sections
 from tests.golden.golden_cases import cases
 from tests.golden.refused import application, bodies, refusals
 
@@ -50,6 +51,18 @@ def _help(_folder: Path) -> dict[str, str]:
     return {" ".join(("stickslip", *words)): helped(words) for words in paths()}
 
 
+def _commands(folder: Path) -> dict[str, str]:
+    """What commands are refused for, those that the file itself names: status and words."""
+    (folder / "file").write_text("in the way")
+    found = {}
+    with contextlib.chdir(folder):
+        for line in sections((DATA / "commands.txt").read_text("utf-8")):
+            status, out, said = asked(*line.split()[1:])
+            found[line] = f"{status}\n{out}{said}".rstrip().replace(str(Path.cwd()), "FOLDER")
+    assert [file.name for file in folder.iterdir()] == ["file"]
+    return found
+
+
 def _tables(_folder: Path) -> dict[str, str]:
     """The tables of docs/, and the sources that are written."""
     found = {f"docs/{page} {name}": made() for page, each in TABLES.items() for name, made in each.items()}
@@ -70,5 +83,6 @@ def _printed(folder: Path) -> dict[str, str]:
 
 FILES: Mapping[str, Callable[[Path], dict[str, str]]] = {
     "openapi.txt": description, "help.txt": _help, "docs.txt": _tables, "studies.txt": _studies,
-    "printed.txt": _printed, "refusals.txt": lambda folder: refusals(folder, list(bodies())),
+    "printed.txt": _printed, "commands.txt": _commands,
+    "refusals.txt": lambda folder: refusals(folder, list(bodies())),
 }  # fmt: skip

@@ -26,7 +26,7 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> Studies:
     return Studies(tmp_path_factory.mktemp("scenes"))
 
 
-@pytest.mark.parametrize("name", ["openapi.txt", "help.txt", "docs.txt", "refusals.txt"])
+@pytest.mark.parametrize("name", ["openapi.txt", "help.txt", "docs.txt", "commands.txt", "refusals.txt"])
 def test_it_is_as_it_was(name: str, tmp_path: Path) -> None:
     assert differences((DATA / name).read_text("utf-8"), joined(FILES[name](tmp_path))) == []
 

@@ -233,22 +233,3 @@ def test_pictures_are_written(
     assert capsys.readouterr().err == ""
     if suffix == ".svg":
         assert "speed [rpm]" in picture.read_text(encoding="utf-8")
-
-
-@each(
-    ("arguments", "word"),
-    [
-        ("two-dof --speeds 10 5", "`--speeds` must have low < high"),
-        ("two-dof --speeds nan 5", "`--speeds` must be a finite number, got nan"),
-        ("two-dof --speeds 5 10 --order 0", "`--order` must be a whole number >= 1"),
-        ("two-dof --speeds 5 10 --order x", "must be a whole number, got 'x'"),
-        ("two-dof --speeds 5 10 --limit -1", "`--limit`"),
-        ("two-dof --speeds 5 10 --band 2 1", "`--band`"),
-        ("two-dof --speeds 5 10 --set damper.N7=1", "damper.N7"),
-        ("two-dof --speeds 5 10 --plot c.txt", "`--plot`"),
-        ("two-dof", "--speeds"),
-    ],
-)
-def test_bad_input_ends_with_two(arguments: str, word: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["campbell", *arguments.split()]) == 2
-    assert word in capsys.readouterr().err

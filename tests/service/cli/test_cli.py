@@ -132,96 +132,12 @@ def test_bad_scenes_are_named(run: Run, tmp_path: Path, command: str, case: str)
     assert [file.name for file in tmp_path.iterdir()] == ["scene.toml"]
 
 
-@each(
-    ("arguments", "words"),
-    [
-        ("solve nowhere.toml --frequency 1", ["nowhere.toml"]),
-        ("solve two-duf --frequency 1", ["two-duf", "did you mean 'two-dof'"]),
-        ("solve two-dof", ["--frequency"]),
-        ("solve two-dof --frequency abc", ["--frequency", "abc"]),
-        ("solve two-dof --frequency nan", ["--frequency", "nan"]),
-        ("solve two-dof --frequency -1", ["--frequency", "-1.0"]),
-        ("solve two-dof --frequency 1 --harmonics 1.5", ["--harmonics", "1.5"]),
-        ("solve two-dof --frequency 1 --harmonics -2", ["--harmonics", "-2"]),
-        ("solve two-dof --frequency 1 --set damper.N0", ["--set", "damper.N0"]),
-        ("solve two-dof --frequency 1 --set damper.N0=much", ["--set", "much"]),
-        ("solve two-dof --frequency 1 --set damper.mu=0,3", ["--set", "0,3: a decimal point, as in 0.3"]),
-        ("solve two-dof --frequency 1 --set damper.N0=-5", ["damper.N0", "-5.0"]),
-        ("solve two-dof --frequency 1 --set bumper.N0=5", ["--set", "bumper.N0", "damper.N0"]),
-        ("solve two-dof --frequency 1 --plot picture.gif", ["--plot", "picture.gif", ".png"]),
-        ("solve two-dof --frequency 1 --plot nowhere/picture.png", ["--plot", "nowhere"]),
-        ("solve two-dof --frequency 1 --effects most", ["--effects", "most", "even-harmonics"]),
-        ("plan two-dof --effects most", ["--effects", "most", "every-sector"]),
-        ("sweep two-dof --from 1 --to 1", ["--to", "1.0"]),
-        ("sweep two-dof --frequency 1.2", ["--frequency", "1.2", "--from"]),
-        ("solve two-dof --frequency 1 --set frequency=5", ["--set", "belongs to the run"]),
-        ("sweep two-dof --from 0 --to 1", ["--from", "0.0"]),
-        ("sweep two-dof --limit -1", ["--limit", "-1.0"]),
-        ("sweep two-dof --parameter bumper.N0 --from 1 --to 2 --frequency 1", ["--parameter", "bumper.N0"]),
-        ("sweep two-dof --parameter damper.N0 --from 1 --to 2", ["--frequency", "damper.N0"]),
-        ("sweep two-dof --parameter damper.N0 --frequency 1 --to 2", ["--from", "damper.N0"]),
-        ("design two-dof --variable damper.N0 20", ["--variable", "damper.N0 20"]),
-        ("design two-dof --variable damper.N0 20 --json", ["--variable", "damper.N0 20"]),
-        ("design two-dof --variable damper.N0 20 many", ["--variable", "many"]),
-        ("design two-dof --variable damper.N0 100 20", ["damper.N0", "100"]),
-        ("design two-dof --variable bumper.N0 1 2", ["--variable", "bumper.N0"]),
-        ("design two-dof --variable damper.N0 1 2 --variable damper.N0 1 3", ["damper.N0", "twice"]),
-        ("design two-dof --max-band 0", ["--max-band", "0.0"]),
-        ("design two-dof --max-peak nan", ["--max-peak", "nan"]),
-        ("design two-dof --limit -1", ["--limit", "-1.0"]),
-        ("design two-dof --harmonics 0", ["--harmonics", "0"]),
-        ("design two-dof --variable damper.N0,bumper.N0 1 2", ["--variable", "bumper.N0"]),
-        ("design two-dof --scaling damper.N0=cubic", ["--scaling", "cubic", "logarithmic"]),
-        ("design two-dof --scaling damper.kt=linear", ["--scaling", "damper.kt"]),
-        ("design two-dof --weight peak", ["--weight", "peak=1"]),
-        ("design two-dof --weight width=1", ["--weight", "width"]),
-        ("design two-dof --weight peak=-1", ["--weight", "-1.0"]),
-        ("design two-dof --forbidden 1", ["--forbidden", "LO HI"]),
-        ("design two-dof --forbidden 1 2", ["--limit", "must be given"]),
-        ("design two-dof --limit 1 --forbidden 1 2 --forbidden 2 1", ["`--forbidden`", "got [2.0, 1.0]"]),
-        ("design two-dof --limit 1 --speeds 1 few", ["--speeds", "few"]),
-        ("design two-dof --max-work bumper=1", ["--max-work", "bumper", "damper"]),
-        ("design two-dof --max-work damper=1 --max-work damper=2", ["--max-work", "damper", "twice"]),
-        ("design two-dof --max-work 0", ["--max-work", "0.0"]),
-        ("design two-dof --max-stress 1e6", ["--max-stress", "needs a stress in `recovery`"]),
-        ("design two-dof --min-margin fillet=1.5", ["--min-margin", "with a `material`"]),
-        ("design two-dof --weight utilisation=1", ["--weight", "with a `material`"]),
-        ("design two-dof --never-separates bumper", ["--never-separates", "bumper", "damper"]),
-        ("design two-dof --method guess", ["--method", "guess", "minimax"]),
-        ("design two-dof --start damper.N0=1", ["--start", "1.0"]),
-        ("design two-dof --start damper.kt=1", ["--start", "damper.kt", "damper.N0"]),
-        ("design two-dof --set damper.mu=-1", ["--set", "damper.mu", "-1.0"]),
-        ("design", ["SCENE", "--problem"]),
-        ("design two-dof --problem nowhere.toml", ["--problem", "nowhere.toml"]),
-        ("design two-dof --problem file", ["--problem", ".toml", "file"]),
-        ("pareto two-dof --points 2", ["--points", "2"]),
-        ("pareto two-dof --max-band 2", ["--max-band"]),
-        ("pareto two-dof --variable damper.N0 20", ["--variable", "LO HI"]),
-        ("sensitivities two-dof --limit 0", ["--limit", "0.0"]),
-        ("sensitivities two-dof --set bumper.N0=1", ["--set", "bumper.N0"]),
-        ("submit design two-dof --max-band nan", ["--max-band", "nan"]),
-        ("march two-dof --frequency 1 --steps 3", ["--steps", "3"]),
-        ("march two-dof --frequency 1 --max-periods 0", ["--max-periods", "0"]),
-        ("serve --port 99999", ["port", "99999"]),
-        ("serve --database nothing", ["database", "nothing"]),
-        ("serve --host 192.0.2.1", ["192.0.2.1", "--port"]),
-        ("db upgrade --database sqlite:////nowhere/jobs.db", ["/nowhere", "jobs.db"]),
-        ("demo --out file", ["--out", "file"]),
-        ("submit solve two-dof --frequency inf", ["--frequency", "inf"]),
-        ("submit solve nowhere.toml --frequency 1", ["nowhere.toml"]),
-        ("watch job --url ::", ["--url", "::"]),
-        ("results job --plot picture.gif", ["--plot", "picture.gif"]),
-        ("dance", ["dance"]),
-        ("", ["Usage"]),
-    ],
-)  # fmt: skip
-def test_bad_options_are_named(run: Run, tmp_path: Path, arguments: str, words: list[str]) -> None:
-    (tmp_path / "file").write_text("in the way")
+@each("arguments, words", [("", ["Usage"]), ("serve --host 192.0.2.1", ["192.0.2.1", "--port"])])
+def test_bad_options_are_named(run: Run, arguments: str, words: list[str]) -> None:
+    """The others, with what is said of them, stand in tests/golden/data/commands.txt."""
     status, out, err = run(arguments)
     assert status == 2
-    assert "Traceback" not in err
     assert [word for word in words if word not in out + err] == []
-    assert [file.name for file in tmp_path.iterdir()] == ["file"]
 
 
 FILES = {

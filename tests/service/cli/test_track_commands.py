@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from each import each
 
 import solver
 from service.cli import main
@@ -27,24 +26,6 @@ def test_words_name_the_least_peak_and_a_picture_is_written(
     assert "least peak" in out
     assert "104.788 N" in out
     assert err == ""
-
-
-@each(
-    ("arguments", "word"),
-    [
-        ("peaks two-dof --parameter damper.N7 --from 1 --to 2", "damper.N7"),
-        ("peaks two-dof --parameter damper.N0 --from 5 --to 5", "differ"),
-        ("peaks two-dof --parameter frequency --from 1 --to 2", "`--parameter`"),
-        ("peaks two-dof --parameter damper.N0 --from 1 --to 2 --checks -1", "`--checks`"),
-        ("map two-dof --parameter damper.N0 --from 1 --to 2 --steps 1", "`--steps`"),
-        ("map two-dof --parameter damper.N0 --from 1 --to 2 --frequencies 1", "`--frequencies`"),
-        ("map two-dof --parameter damper.N0 --from 1 --to 2 --steps 4001 --frequencies 1000", "`--steps`"),
-        ("map two-dof --parameter damper.N0 --from 1 --to x", "x"),
-    ],
-)
-def test_bad_input_ends_with_two(arguments: str, word: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(arguments.split()) == 2
-    assert word in capsys.readouterr().err
 
 
 def test_the_ridge_is_broken_only_where_another_peak_becomes_the_highest() -> None:
