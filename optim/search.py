@@ -23,7 +23,6 @@ from optim.methods.enough_harmonics import (
 from optim.methods.evaluator import DesignSearch, SearchStoppedError, Tally
 from optim.methods.global_search import GlobalSearch
 from optim.methods.linearised import FLAT_SLOPE, Local, LocalSearch, settled_status
-from optim.methods.peak_tracking import tracked_optimum, tracked_starts
 from optim.methods.plateau import with_plateau
 from optim.problem.design_problem import Limit, Method, Problem, pose
 from optim.problem.problem_keys import OPTIONS, ROBUST, DesignKeys, keywords
@@ -223,12 +222,14 @@ def _searched(problem: Problem, before: DesignResult, seen: Seen) -> DesignResul
 
 
 def _by_method(problem: Problem, before: DesignResult, seen: Seen) -> DesignResult:
-    """Return the best design by the method of a problem; CasADi and CVXPY are loaded when they are needed."""
+    """Return the best design by the method of a problem, which is loaded when it is needed."""
     on_progress, should_stop = seen.tally.after(before.evaluations), seen.should_stop
     if problem.method is Method.PERFORMANCE_CURVE:
         from optim.methods.performance_curve import curve_optimum
 
         return curve_optimum(problem, on_progress=on_progress, should_stop=should_stop)
+    from optim.methods.peak_tracking import tracked_optimum, tracked_starts
+
     tracked = None
     if problem.method in (Method.AUTO, Method.TRACKED) and problem.why_not_tracked is None:
         tracked = tracked_optimum(

@@ -18,6 +18,7 @@ import numpy as np
 
 from optim.identification.data.measured import MeasuredRows, Predicted
 from optim.identification.unknowns import Unknowns
+from optim.methods.surrogate import quasi_random
 from optim.problem.variables import Real
 from solver.jit.fourier import Integer
 from solver.results.watch import OnProgress, ShouldStop
@@ -57,7 +58,7 @@ class Runs:
         self.observations = np.concatenate([run.observations for run in self.runs])
         sizes = [run.observations.size for run in self.runs]
         self.slices = [slice(end - size, end) for end, size in zip(np.cumsum(sizes), sizes, strict=True)]
-        self.fitted = len(unknowns) + sum(run.fitted_besides for run in self.runs)
+        self.fitted = len(unknowns) + sum(run.FITTED_BESIDES for run in self.runs)
         self.evaluations = 0
         self._last: Fitted | None = None
 
@@ -316,10 +317,8 @@ def misfit(runs: Runs, found: Fitted) -> float:
 
 def _places(runs: Runs, starts: int, seed: int) -> list[Real]:
     """Return the scene's own values, the middle, and places of a Sobol sequence."""
-    from scipy.stats import qmc
-
     n = len(runs.unknowns)
     middle = np.full(n, 0.5)
     rest = max(starts - 2, 0)
-    sobol = qmc.Sobol(n, seed=seed).random_base2(max(int(np.ceil(np.log2(max(rest, 1)))), 0))[:rest]
+    sobol = quasi_random(n, max(rest, 1), seed)[:rest]
     return [runs.unknowns.start(runs.scene), middle, *sobol][:starts]

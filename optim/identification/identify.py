@@ -98,7 +98,14 @@ def identify(
         result = _nothing(runs, found, stopped=should_stop is not None and should_stop())
     else:
         _check_plausible(runs, found.best)
-        result = _judged(runs, found, found.best, told, conditions)
+        level_known = found.best.level == 1.0
+        info = information(runs, found.best, robust=robust, level_known=level_known)
+        level = found.best.level if not level_known else math.nan if noise is None else noise
+        misfit = misfit_of(runs, found.best, info, robust=robust)
+        result = replace(
+            _described(runs, found, found.best, info, misfit, level),
+            candidates=rank(runs, found.best, info, conditions),
+        )  # fmt: skip
     return replace(result, seconds=clock() - begun)
 
 
@@ -124,24 +131,12 @@ def _check_plausible(runs: Runs, best: LocalFit) -> None:
         ratio = seen / computed if computed > 0.0 else math.inf
         if not 1.0 / _IMPLAUSIBLE < ratio < _IMPLAUSIBLE:
             wanted = (
-                f"must be {run.unit_words} such as the scene has under {run.words}, at most {computed:.3g} "
+                f"must be {run.UNIT_WORDS} such as the scene has under {run.words}, at most {computed:.3g} "
                 "with the best values within the bounds: give the unit in the head of the column, "
                 "`amplitude [mm]`, and look at the excitation"
             )
             size = seen / run.scale
             raise DataError(run.source, float(f"{size:.4g}"), wanted)
-
-
-def _judged(
-    runs: Runs, found: Searched, best: LocalFit, told: Noise, conditions: Sequence[Mapping[str, float]]
-) -> Identification:
-    """Return what the fit tells, whether the model describes the data, and what to measure next."""
-    level_known = best.level == 1.0
-    info = information(runs, best, robust=told.robust, level_known=level_known)
-    misfit = misfit_of(runs, best, info, robust=told.robust)
-    level = best.level if not level_known else math.nan if told.level is None else told.level
-    result = _described(runs, found, best, info, misfit, level)
-    return replace(result, candidates=rank(runs, best, info, conditions))
 
 
 def _described(
@@ -187,7 +182,17 @@ def _described(
 
 def misfit_of(runs: Runs, best: LocalFit, info: Information, *, robust: bool) -> str:
     """Return why the model does not describe the data, its one likeliest cause; empty if it does."""
-    size = _misfit(info.reduced_chi2) if best.level == 1.0 else _scatter(best.level)
+    size = ""
+    if best.level == 1.0 and info.reduced_chi2 > _MISFIT:
+        size = (
+            "The residuals are larger than the noise given: the model does not describe the data, or the "
+            "noise is larger (leave `noise` out to judge by what is left over)."
+        )
+    elif best.level != 1.0 and best.level > _MOST_SCATTER:
+        size = (
+            f"The fit leaves {100.0 * best.level:.3g} % of the responses, far more than measurements "
+            "scatter: the model does not describe the data."
+        )
     cause = doubts(runs, best, robust=robust)
     if size and not cause:
         cause = (
@@ -195,26 +200,6 @@ def misfit_of(runs: Runs, best: LocalFit, info: Information, *, robust: bool) ->
             "another structure, place or unit."
         )
     return f"{size} {cause}".strip()
-
-
-def _misfit(reduced_chi2: float) -> str:
-    """Return what residuals far above the noise given say."""
-    if reduced_chi2 <= _MISFIT:
-        return ""
-    return (
-        "The residuals are larger than the noise given: the model does not describe the data, or the noise "
-        "is larger (leave `noise` out to judge by what is left over)."
-    )
-
-
-def _scatter(level: float) -> str:
-    """Return what a level of the noise says that was found in the residuals."""
-    if not level > _MOST_SCATTER:
-        return ""
-    return (
-        f"The fit leaves {100.0 * level:.3g} % of the responses, far more than measurements scatter: the "
-        "model does not describe the data."
-    )
 
 
 def _estimates(

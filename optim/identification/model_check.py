@@ -16,7 +16,6 @@ Four tests of the residuals, each at a level of `_LEVEL` shared among all it tri
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,19 +61,17 @@ def doubts(runs: Runs, best: LocalFit, *, robust: bool) -> str:
     rest[best.active] = best.residuals(runs.observations)
     if robust:
         rest = np.clip(rest, -HUBER, HUBER)
-    curves = [curve for curve in _curves(runs, rest) if curve.size >= _FEWEST]
+    every = [
+        curve[np.isfinite(curve)]
+        for run, part in zip(runs.runs, runs.slices, strict=True)
+        for curve in run.curves(rest[part])
+    ]
+    curves = [curve for curve in every if curve.size >= _FEWEST]
     explained = _explanation(runs, best, rest)
     far = "" if robust else _outliers(rest[best.active], len(runs.unknowns))
     # What would explain the data says most; the others are signs of what is not named.
     found = next((told for told in (explained, far, _one_side(curves), _one_sign(curves)) if told), "")
     return f"{found} Intervals would say nothing." if found else ""
-
-
-def _curves(runs: Runs, rest: Real) -> Iterator[Real]:
-    """Yield the residuals of each curve in its order, those that do not count left out."""
-    for run, part in zip(runs.runs, runs.slices, strict=True):
-        for curve in run.curves(rest[part]):
-            yield curve[np.isfinite(curve)]
 
 
 def _one_sign(curves: list[Real]) -> str:
@@ -137,11 +134,20 @@ def _explanation(runs: Runs, best: LocalFit, rest: Real) -> str:
 
     z = best.fitted.z
     free = (z > _BOUND) & (z < 1.0 - _BOUND)
-    held = [_beyond(runs, best, int(i)) for i in np.flatnonzero(~free)]
-    directions = [*held, *_others(runs, best), _scale(best), *_harmonics(runs, best)]
+    jacobian, names = best.fitted.jacobian, runs.unknowns.names
+    beyond = [
+        _Direction(words=f"{names[i]} were beyond its bound ({{}} of their range)", rows=jacobian[:, i])
+        for i in np.flatnonzero(~free)
+    ]
+    scale = _Direction(
+        words="all that was measured were scaled, {}: rms in place of peak values, a sensor, or the "
+        "excitation",
+        rows=best.fitted.values,
+    )
+    directions = [*beyond, *_others(runs, best), scale, *_harmonics(runs, best)]
     used = best.active & np.isfinite(np.array([each.rows for each in directions])).all(axis=0)
     sd, rest = best.sd[used], rest[used]
-    basis, sizes, _ = np.linalg.svd(best.fitted.jacobian[used][:, free] / sd[:, None], full_matrices=False)
+    basis, sizes, _ = np.linalg.svd(jacobian[used][:, free] / sd[:, None], full_matrices=False)
     basis = basis[:, sizes > _TINY * max(sizes.max(initial=0.0), 1e-300)]
     rest = rest - basis @ (basis.T @ rest)
     degrees = rest.size - basis.shape[1] - 1
@@ -155,17 +161,12 @@ def _explanation(runs: Runs, best: LocalFit, rest: Real) -> str:
         change = -float(rows @ rest) / size
         gain, left = change * change * size, float(rest @ rest)
         ratio = gain * degrees / max(left - gain, 1e-300)
-        tried.append((float(f.sf(ratio, 1, degrees)), each.words.format(_per_cent(change))))
+        told = f"{abs(100.0 * change):.2g} % {'larger' if change > 0.0 else 'smaller'}"
+        tried.append((float(f.sf(ratio, 1, degrees)), each.words.format(told)))
     tried.sort()
     if not tried or tried[0][0] * len(tried) > _LEVEL:
         return ""
     return f"The residuals look as if {tried[0][1]}."
-
-
-def _beyond(runs: Runs, best: LocalFit, i: int) -> _Direction:
-    """Return an unknown that lies at a bound."""
-    words = f"{runs.unknowns.names[i]} were beyond its bound ({{}} of their range)"
-    return _Direction(words=words, rows=best.fitted.jacobian[:, i])
 
 
 def _others(runs: Runs, best: LocalFit) -> list[_Direction]:
@@ -204,12 +205,6 @@ def _all_named(scene: Scene) -> Scene:
     return scene.model_copy(update={"structure": structure.model_copy(update=parts)})
 
 
-def _scale(best: LocalFit) -> _Direction:
-    """Return the scale of all that was measured."""
-    words = "all that was measured were scaled, {}: rms in place of peak values, a sensor, or the excitation"
-    return _Direction(words=words, rows=best.fitted.values)
-
-
 def _harmonics(runs: Runs, best: LocalFit) -> list[_Direction]:
     """Return what twice the harmonics would change."""
     more = Runs(runs.scene, runs.runs, runs.unknowns, 2 * runs.harmonics + 1)
@@ -218,7 +213,3 @@ def _harmonics(runs: Runs, best: LocalFit) -> list[_Direction]:
     if not np.isfinite(rows[best.active]).all() or not rows[best.active].any():
         return []
     return [_Direction(words="harmonics were left out: take more ({} of what twice as many add)", rows=rows)]
-
-
-def _per_cent(change: float) -> str:
-    return f"{abs(100.0 * change):.2g} % {'larger' if change > 0.0 else 'smaller'}"

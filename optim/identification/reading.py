@@ -19,6 +19,7 @@ from optim.identification.readers.data_readers import (
     Head,
     complex_apart,
     format_of,
+    numbers_of,
     read_file,
     read_head,
     table_of,
@@ -178,17 +179,9 @@ def _table_of(given: Mapping[str, Any], index: int, paths: frozenset[str]) -> Ta
         wanted = "must be a column (a list), `conditions`, `units`, or a word such as dof or contact"
         raise DataError(source, lost[0], wanted, place=place)
     heads = [f"{name} [{units[name]}]" if name in units else name for name in columns]
-    numbers = [_numbers(source, name, values, place) for name, values in columns.items()]
+    numbers = [numbers_of(source, name, values, (*place, name)) for name, values in columns.items()]
     heads, parts = complex_apart(source, heads, numbers)
     return table_of(source, heads, parts, head, paths, place=place)
-
-
-def _numbers(source: str, name: str, values: Any, place: tuple[str | int, ...]) -> np.ndarray:
-    for row, value in enumerate(values):
-        if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, complex, np.number)):
-            wanted = "must be a number: leave the whole row out if it is missing"
-            raise DataError(f"{source}, row {row}", value, wanted, column=name, place=(*place, name))
-    return np.array(values)
 
 
 def _runs(scene: Scene, table: Table, paths: frozenset[str], unknown: frozenset[str]) -> list[MeasuredRows]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -83,17 +83,11 @@ class Unknowns:
 
     def start(self, scene: Scene) -> Real:
         """Return the scaled values of the scene, kept within the bounds; the middle where it has none."""
-        return np.array([_place(scene, variable) for variable in self.variables])
-
-
-def _place(scene: Scene, variable: BoundedVariable) -> float:
-    value = scene.value(variable.paths[0])
-    return variable.inside(value) if variable.low <= value <= variable.high else 0.5
-
-
-def _pair(bounds: Sequence[float]) -> Any:
-    """Return a list of two as a pair; anything else as it is, to be refused."""
-    return tuple(bounds) if isinstance(bounds, Sequence) and not isinstance(bounds, str) else bounds
+        values = [scene.value(variable.paths[0]) for variable in self.variables]
+        return np.array([
+            variable.inside(value) if variable.low <= value <= variable.high else 0.5
+            for variable, value in zip(self.variables, values, strict=True)
+        ])  # fmt: skip
 
 
 def read_unknowns(
@@ -115,9 +109,7 @@ def read_unknowns(
     """
     if not isinstance(unknowns, Mapping) or not unknowns:
         raise DesignError(UNKNOWNS, unknowns, "must name at least one parameter path with (low, high)")
-    variables = check_variables(
-        scene, {name: _pair(bounds) for name, bounds in unknowns.items()}, scaling, key=UNKNOWNS
-    )
+    variables = check_variables(scene, unknowns, scaling, key=UNKNOWNS)
     by_name = {variable.name: variable for variable in variables}
     known: dict[str, Prior] = {}
     for name, pair in (priors or {}).items():

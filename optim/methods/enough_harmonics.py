@@ -24,7 +24,6 @@ from solver.response.solution import MEAN_UNDETERMINED
 from solver.results.known import Known
 from solver.results.measures import HALF_PEAK_TO_PEAK
 from solver.results.watch import ShouldStop
-from solver.scene.scene import Scene
 from solver.studies.peaks.seeds import fitted
 
 CLAIMS = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.APPROXIMATE)
@@ -192,19 +191,14 @@ def _by_its_measure(problem: Problem, evaluation: DesignEvaluation) -> Problem:
     """
     if problem.keeps_measure or all(case.scene.observe.centred for case in problem.cases):
         return problem
-    if not any(_lopsided(known) for _, known in evaluation.known_parts):
+    parts = [known for _, known in evaluation.known_parts if known.measure == HALF_PEAK_TO_PEAK]
+    if all(known.peak_max_abs <= known.value * (1.0 + NO_MEAN) for known in parts):
         return problem
-    cases = tuple(replace(case, scene=_half_peak_to_peak(case.scene)) for case in problem.cases)
+    measured = {"measure": HALF_PEAK_TO_PEAK}
+    scenes = [
+        case.scene.model_copy(update={"observe": case.scene.observe.model_copy(update=measured)})
+        for case in problem.cases
+    ]
+    cases = tuple(replace(case, scene=scene) for case, scene in zip(problem.cases, scenes, strict=True))
     method = Method.AUTO if problem.method is Method.TRACKED else problem.method
     return replace(problem, cases=cases, method=method)
-
-
-def _lopsided(known: Known) -> bool:
-    """Return whether the mean of a peak is free and not zero."""
-    free = known.measure == HALF_PEAK_TO_PEAK
-    return free and not known.peak_max_abs <= known.value * (1.0 + NO_MEAN)
-
-
-def _half_peak_to_peak(scene: Scene) -> Scene:
-    observe = scene.observe.model_copy(update={"measure": HALF_PEAK_TO_PEAK})
-    return scene.model_copy(update={"observe": observe})

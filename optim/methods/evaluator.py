@@ -30,6 +30,12 @@ class SearchStoppedError(Exception):
         super().__init__(status.value)
 
 
+def stop_if_asked(should_stop: ShouldStop) -> None:
+    """Raise SearchStoppedError if the caller asks to stop."""
+    if should_stop is not None and should_stop():
+        raise SearchStoppedError(DesignStatus.STOPPED)
+
+
 class DesignSearch:
     """Evaluates designs, keeps all of them, reports progress and looks whether to stop."""
 
@@ -65,7 +71,7 @@ class DesignSearch:
         StoppedError
             The caller asked to stop, or the evaluations are used up.
         """
-        self.check()
+        stop_if_asked(self.should_stop)
         place = self._place(values)
         if place in self._known:
             return self._known[place]
@@ -117,11 +123,6 @@ class DesignSearch:
         """Count those responses."""
         self._before += sweeps
         self.scouted += sweeps
-
-    def check(self) -> None:
-        """Raise StoppedError if the caller asked to stop."""
-        if self.should_stop is not None and self.should_stop():
-            raise SearchStoppedError(DesignStatus.STOPPED)
 
     def keep(self, evaluation: DesignEvaluation) -> None:
         """Add an evaluation to the history and report it."""

@@ -472,7 +472,7 @@ class Samples:
     def _where_kept(self) -> list[Real]:
         """Return places where the limits may be kept, as far as what was seen tells."""
         return promising(
-            self.models(), quasi_random(self.n, 2 ** math.ceil(math.log2(MORE_EACH * self.n)), SEED),
+            self.models(), quasi_random(self.n, MORE_EACH * self.n, SEED),
             (1.0 + KEPT) * math.exp(self.off), self.apart, MORE_AT_ONCE * self.n, doubt=LOOSE,
         )  # fmt: skip
 

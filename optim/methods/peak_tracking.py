@@ -143,7 +143,12 @@ def tracked_starts(
     starts = [] if problem.start is None else [dict(problem.start)]
     if problem.method is not Method.AUTO or len(problem.cases) > MOST_CASES:
         return starts, None
-    for one in _cases(problem):
+    singles = [
+        replace(problem, cases=(case,), limits={}, start=None, limit=None)
+        for case in problem.cases
+        if problem.peak_alone
+    ]
+    for one in (single for single in singles if single.why_not_tracked is None):
         tracked = plain or tracked_optimum(
             one, on_progress=search.tracking, should_stop=search.should_stop
         )  # fmt: skip
@@ -154,14 +159,6 @@ def tracked_starts(
             if proven is not None:
                 return starts, proven
     return starts, None
-
-
-def _cases(problem: Problem) -> list[Problem]:
-    """Return the plain problems of the single cases that can be tracked."""
-    if not problem.peak_alone:
-        return []
-    plain = [replace(problem, cases=(case,), limits={}, start=None, limit=None) for case in problem.cases]
-    return [one for one in plain if one.why_not_tracked is None]
 
 
 def _kept(search: DesignSearch, tracked: DesignResult) -> DesignResult | None:

@@ -18,7 +18,7 @@ from scipy.optimize import minimize, minimize_scalar
 
 from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.evaluation import evaluate
-from optim.methods.evaluator import SearchStoppedError
+from optim.methods.evaluator import SearchStoppedError, stop_if_asked
 from optim.methods.linearised import of_one
 from optim.methods.surrogate import quasi_random
 from optim.problem.design_problem import Method, Problem
@@ -58,8 +58,7 @@ class _Curves:
 
     def curve(self, values: Mapping[str, float], factors: tuple[float, float]) -> PerformanceCurve:
         """Return the curve of a design; raises StoppedError if the caller stops it."""
-        if self.should_stop is not None and self.should_stop():
-            raise SearchStoppedError(DesignStatus.STOPPED)
+        stop_if_asked(self.should_stop)
         self.count += 1
         if self.on_progress is not None:
             self.on_progress(min(0.9, self.count / 50.0), self.count)
@@ -194,7 +193,7 @@ def _shared(curves: _Curves) -> tuple[Real | None, PerformanceCurve] | None:
 def _own(curves: _Curves) -> Real | None:
     """Return the best design by a curve for each, scaled; None where no curve reaches the excitation."""
     n = len(curves.problem.variables)
-    looks = np.linspace(0.0, 1.0, _LOOKS_ONE)[:, None] if n == 1 else quasi_random(n, _looks(n))
+    looks = np.linspace(0.0, 1.0, _LOOKS_ONE)[:, None] if n == 1 else quasi_random(n, _LOOKS_EACH * n)
     start = curves.problem.start
     if start is not None:
         own = [variable.inside(start[variable.name]) for variable in curves.problem.variables]
@@ -213,8 +212,3 @@ def _own(curves: _Curves) -> Real | None:
     for place in looks[order[: min(n, _STARTS)]]:
         minimize(relative, place, jac=True, method="L-BFGS-B", bounds=[(0.0, 1.0)] * n, options=options)
     return min(curves.seen, key=lambda one: one[1])[0]
-
-
-def _looks(n: int) -> int:
-    """Return how many designs of several variables are looked at: a power of two."""
-    return int(2 ** math.ceil(math.log2(_LOOKS_EACH * n)))

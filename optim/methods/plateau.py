@@ -18,7 +18,7 @@ from optim.criteria.criterion import CriterionRow
 from optim.criteria.evaluation import evaluate
 from optim.criteria.peak_criterion import PEAK
 from optim.methods.enough_harmonics import MOST_HARMONICS
-from optim.methods.evaluator import DesignSearch, SearchStoppedError
+from optim.methods.evaluator import DesignSearch, SearchStoppedError, stop_if_asked
 from optim.methods.linearised import KEPT, KKT_TOLERANCE, conditions, model_of, optimum_at, settled_status
 from optim.problem.design_problem import Method, Problem
 from optim.problem.variables import BoundedVariable, parameter_values
@@ -118,8 +118,7 @@ class _Level:
         return self._evaluated(values, gradients=True)
 
     def _evaluated(self, values: Mapping[str, float], *, gradients: bool = False) -> DesignEvaluation:
-        if self._should_stop is not None and self._should_stop():
-            raise SearchStoppedError(DesignStatus.STOPPED)
+        stop_if_asked(self._should_stop)
         found = evaluate(
             self._problem, values, gradients=gradients, errors=False, should_stop=self._should_stop
         )  # fmt: skip
@@ -376,22 +375,20 @@ def _improved(
 def _merged(result: DesignResult, plateau: DesignPlateau) -> tuple[LocalOptimum, ...]:
     """Return the local optima with those of one plateau as one, at the design chosen."""
     chosen = plateau.evaluation
+
+    def on_it(basin: LocalOptimum) -> bool:
+        """Along its variables within the plateau, elsewhere at its place."""
+        ends = {name: (value, value) for name, value in chosen.values.items()} | dict(plateau.intervals)
+        here = ((value, *ends[name]) for name, value in basin.values.items())
+        return all(low * (1.0 - 1e-3) <= value <= high * (1.0 + 1e-3) for value, low, high in here)
+
     first = optimum_at(chosen, settled=True, feasible=all(basin.feasible for basin in result.basins[:1]))
     others = [
         basin
         for basin in result.basins[1:]
-        if basin.objective > chosen.objective * (1.0 + 1e-6) or not _on(plateau, basin, chosen)
+        if basin.objective > chosen.objective * (1.0 + 1e-6) or not on_it(basin)
     ]
     return (first, *others)
-
-
-def _on(plateau: DesignPlateau, basin: LocalOptimum, chosen: DesignEvaluation) -> bool:
-    """Return whether a basin lies on a plateau: along its variables within it, elsewhere at its place."""
-    for name, value in basin.values.items():
-        low, high = plateau.intervals.get(name, (chosen.values[name], chosen.values[name]))
-        if not low * (1.0 - 1e-3) <= value <= high * (1.0 + 1e-3):
-            return False
-    return True
 
 
 def _checked(
@@ -407,8 +404,7 @@ def _checked(
     designs = [result.optimum, *(dict(basin.values) for basin in result.basins[1:MOST_CHECKED])]
     checked, responses = [], 0
     for values in designs:
-        if should_stop is not None and should_stop():
-            raise SearchStoppedError(DesignStatus.STOPPED)
+        stop_if_asked(should_stop)
         same = (one for one in more if one.values == values and one.harmonics == problem.harmonics)
         found = next(same, None)
         if found is None:

@@ -43,16 +43,20 @@ def places(n: int, known: int = 0) -> Real:
     faces = np.repeat(middle, 2 * n, axis=0)
     for i in range(n):
         faces[2 * i, i], faces[2 * i + 1, i] = 0.0, 1.0
-    between = quasi_random(n, 2 ** math.ceil(math.log2(LOOKS_EACH * n)))
+    between = quasi_random(n, LOOKS_EACH * n)
     # The first place of the sequence is a corner, the second the middle.
     ends = corners(n)
     return np.vstack([middle, faces, ends[:2], between[2 + known :], ends[2:]])
 
 
-def quasi_random(n: int, count: int, seed: int | None = None) -> Real:
-    """Return the first places of a Sobol sequence in the unit box, (count, n); scrambled if it has a seed."""
+def quasi_random(n: int, least: int, seed: int | None = None) -> Real:
+    """Return the first places of a Sobol sequence in the unit box, (count, n); scrambled if it has a seed.
+
+    They are `least`, or more: balanced are powers of two.
+    """
     from scipy.stats import qmc  # takes half a second to load, and a design of one variable needs none
 
+    count = 2 ** max(math.ceil(math.log2(least)), 0)
     return np.asarray(qmc.Sobol(n, scramble=seed is not None, seed=seed).random(count))
 
 
@@ -117,7 +121,7 @@ def candidates(n: int, seed: int) -> Real:
     """Return places of the unit box that are compared, (k, n); other ones for another seed."""
     if n == 1:
         return np.linspace(0.0, 1.0, 2 * CANDIDATES + 1)[:, None]
-    places = quasi_random(n, 2 ** int(np.ceil(np.log2(CANDIDATES * n))), seed)
+    places = quasi_random(n, CANDIDATES * n, seed)
     # A share of them on the faces: the best design often lies on one.
     faces = np.arange(0, len(places), 4)
     places[faces, faces // 4 % n] = (faces // 4 // n) % 2

@@ -118,7 +118,7 @@ def slopes(variables: Sequence[BoundedVariable], values: Mapping[str, float]) ->
 
 def check_variables(
     scene: Scene,
-    variables: Mapping[str, tuple[float, float]] | None,
+    variables: Mapping[str, Sequence[float]] | None,
     scaling: Mapping[str, str] | None = None,
     *,
     key: str = "variables",

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.peak_criterion import PEAK
-from optim.methods.evaluator import SearchStoppedError
+from optim.methods.evaluator import SearchStoppedError, stop_if_asked
 from optim.methods.linearised import KEPT, Local, Model, is_flat, of_limits
 from optim.methods.minimax import REMEMBERED, minimax_search
 from optim.methods.surrogate import quasi_random
@@ -85,15 +85,14 @@ class RobustSearch:
         key = self._key(values, scenario, gradients)
         if (known := self._known_outcome(key)) is not None:
             return known
-        if self._should_stop is not None and self._should_stop():
-            raise SearchStoppedError(DesignStatus.STOPPED)
+        stop_if_asked(self._should_stop)
         if self.responses >= MOST_RESPONSES:
             raise SearchStoppedError(DesignStatus.TOO_MANY)
         found = self._ahead.take(key) or outcome(
             self.problem, values, scenario, gradients=gradients, should_stop=self._should_stop
         )
-        if not found.good and self._should_stop is not None and self._should_stop():
-            raise SearchStoppedError(DesignStatus.STOPPED)
+        if not found.good:
+            stop_if_asked(self._should_stop)
         self._outcomes[key] = found
         self.count(found.responses)
         return found
@@ -284,8 +283,9 @@ def cutting_sets(
     StoppedError, UnknownScenarioError
         The caller asked to stop; a scenario could not be computed.
     """
+    first = dict(nominal.optimum) if nominal.optimum else _coarse(search.problem)[0]
     for scenario in search.uncertain.middle():
-        progress.add(search.outcome(_first(search, nominal), scenario), math.nan)
+        progress.add(search.outcome(first, scenario), math.nan)
     if nominal.evaluation is not None and nominal.evaluation.good:
         for outcomes, _ in _worse(search, nominal.optimum, progress, ()):
             for found in outcomes:
@@ -388,11 +388,6 @@ def sampled(
     return _ended(local)
 
 
-def _first(search: RobustSearch, nominal: DesignResult) -> dict[str, float]:
-    """Return the nominal optimum, or else the first design of the coarse stage."""
-    return dict(nominal.optimum) if nominal.optimum else _coarse(search.problem)[0]
-
-
 def _starts(
     search: RobustSearch, nominal: DesignResult, scenarios: Sequence[Scenario]
 ) -> list[DesignEvaluation]:
@@ -436,15 +431,13 @@ def _locals(
         if len(places) < search.problem.basins and all(math.dist(z, other) > FAR_APART for other in places):
             places.append(z)
             local = search.improve(begin.values, scenarios)
-            if local is not None and all(_apart(search, local, other) for other in found):
+            if local is None:
+                continue
+            end = scaled(search.variables, local.evaluation.values)
+            ends = [scaled(search.variables, other.evaluation.values) for other in found]
+            if all(math.dist(end, other) > SAME_PLACE for other in ends):
                 found.append(local)
     return found, None
-
-
-def _apart(search: RobustSearch, one: Local, other: Local) -> bool:
-    """Return whether two local optima are two."""
-    places = [scaled(search.variables, local.evaluation.values) for local in (one, other)]
-    return math.dist(*places) > SAME_PLACE
 
 
 def _ended(best: Local) -> RobustStatus:
@@ -459,7 +452,7 @@ def _coarse(problem: Problem) -> list[dict[str, float]]:
     if n == 1:
         points = [[i / (COARSE_ONE - 1.0)] for i in range(COARSE_ONE)]
     else:
-        points = quasi_random(n, 2 ** math.ceil(math.log2(COARSE_EACH * n))).tolist()
+        points = quasi_random(n, COARSE_EACH * n).tolist()
     designs = [unscaled(problem.variables, point) for point in points]
     start = None if problem.start is None else dict(problem.start)
     return [start, *designs] if start is not None and start not in designs else designs

@@ -96,13 +96,9 @@ Ask = Callable[[Scenario], Outcome]
 Ahead = Callable[[Sequence[Scenario]], None]
 
 
-def _one_by_one(_scenarios: Sequence[Scenario]) -> None:
-    """For who asks in another way."""
-
-
 def pessimise(
     ask: Ask, uncertain: UncertainSet, aspect: Aspect, known: Sequence[Scenario], *,
-    ahead: Ahead = _one_by_one, besides: Sequence[Scenario] = (), thorough: bool = False,
+    ahead: Ahead = lambda _scenarios: None, besides: Sequence[Scenario] = (), thorough: bool = False,
 ) -> Finding:  # fmt: skip
     """Return the worst scenario of a design in one aspect.
 

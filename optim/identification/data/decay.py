@@ -65,22 +65,14 @@ class DecayRun(CurveRun):
     range: Annotated[tuple[float, float], "Largest and smallest amplitude measured [√kg m]."]
 
     KIND_NAME: ClassVar = "decay"
+    UNIT_WORDS: ClassVar = "modal amplitudes [√kg m]"
+    FITTED_BESIDES: ClassVar = 1  # the shift of the time
     TOLD: ClassVar = {
         "modal_amplitude": "modal amplitude a [√kg m]",
         "frequency": "frequency [Hz]",
         "time": "time [s]",
     }
     SHARES: ClassVar = {"frequency": SHARPER}  # frequencies are measured much better
-
-    @property
-    def fitted_besides(self) -> int:
-        """As the base says: the shift of the time."""
-        return 1
-
-    @property
-    def unit_words(self) -> str:
-        """As the base says."""
-        return "modal amplitudes [√kg m]"
 
     def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> RunModel:
         """As the base says."""

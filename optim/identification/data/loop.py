@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -46,15 +46,12 @@ class LoopRun(MeasuredRows):
     samples: Annotated[int, "They were made of."]
     sd: Annotated[float | None, "Standard deviation of a sample of the force [N]."]
 
+    UNIT_WORDS: ClassVar = "forces [N]"
+
     @property
     def scale(self) -> float:
         """What a coefficient is multiplied by to have the noise of a sample, √(samples/2)."""
         return math.sqrt(0.5 * self.samples)
-
-    @property
-    def unit_words(self) -> str:
-        """As the base says."""
-        return "forces [N]"
 
     @property
     def observations(self) -> Real:

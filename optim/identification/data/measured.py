@@ -96,15 +96,10 @@ class MeasuredRows(ABC):
         """
         return ()
 
-    @property
-    def fitted_besides(self) -> int:
-        """How many numbers of its own, no parameters of the scene, its model fits to the observations."""
-        return 0
-
-    @property
-    def unit_words(self) -> str:
-        """What the observations are, with their unit."""
-        return "displacements [m]"
+    UNIT_WORDS: ClassVar[str] = "displacements [m]"
+    """What the observations are, with their unit."""
+    FITTED_BESIDES: ClassVar[int] = 0
+    """How many numbers of its own, no parameters of the scene, its model fits to the observations."""
 
     @property
     def scale(self) -> float:

@@ -47,17 +47,13 @@ class ModeRun(CurveRun):
     nodal_diameter: Annotated[int | None, "Of a cyclic structure."]
 
     KIND_NAME: ClassVar = "mode"
+    UNIT_WORDS: ClassVar = "frequencies [Hz] and damping ratios"
     TOLD: ClassVar = {
         "modal_amplitude": "modal amplitude a [√kg m]",
         "frequency": "frequency [Hz]",
         "damping_ratio": "damping ratio",
     }
     SHARES: ClassVar = {"frequency": SHARPER}  # frequencies are measured much better
-
-    @property
-    def unit_words(self) -> str:
-        """As the base says."""
-        return "frequencies [Hz] and damping ratios"
 
     def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> RunModel:
         """As the base says."""

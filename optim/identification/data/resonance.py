@@ -58,11 +58,6 @@ class ResonanceRun(CurveRun):
     }
     SHARES: ClassVar = {"resonance_frequency": SHARPER}  # frequencies are measured better
 
-    @property
-    def unit_words(self) -> str:
-        """As the base says."""
-        return "displacements [m]"
-
     def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> RunModel:
         """As the base says."""
         return _ResonanceModel(self, observing_dof(scene, self.dof), tuple(paths), harmonics)

@@ -7,7 +7,7 @@ A further format is one module and one line in `SHIPPED`; one from outside the p
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -197,6 +197,22 @@ def table_of(
         words=words,
         lines=np.zeros(0, np.int64) if lines is None else lines, place=place,
     )  # fmt: skip
+
+
+def numbers_of(source: str, name: str, values: Iterable[object], place: Place = ("data",)) -> np.ndarray:
+    """Return the numbers of a column.
+
+    Raises
+    ------
+    DataError
+        One is none, with its row.
+    """
+    cells = list(values)
+    for row, value in enumerate(cells):
+        if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, complex, np.number)):
+            wanted = "must be a number: leave the whole row out if it is missing"
+            raise DataError(f"{source}, row {row}", value, wanted, column=name, place=place)
+    return np.array(cells)
 
 
 def _wrong_scaling(name: str, unit: Unit) -> str:

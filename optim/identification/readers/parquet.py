@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from optim.identification.data.measured_table import Table
-from optim.identification.readers.data_readers import DataFormat, read_head, table_of
+from optim.identification.readers.data_readers import DataFormat, numbers_of, read_head, table_of
 from optim.problem.checks import DataError
-from optim.problem.variables import Real
 from solver.errors import MissingExtraError
 
 
@@ -39,16 +38,11 @@ def read_parquet(path: Path, paths: frozenset[str]) -> list[Table]:
         if len(value) <= 200
     }
     head = read_head(path.name, told, paths)
-    columns = [_numbers(path.name, name, found.column(name).to_pylist()) for name in found.column_names]
+    columns = [
+        np.asarray(numbers_of(path.name, name, found.column(name).to_pylist()), np.float64)
+        for name in found.column_names
+    ]
     return [table_of(path.name, found.column_names, columns, head, paths)]
-
-
-def _numbers(source: str, name: str, cells: list[object]) -> Real:
-    for row, cell in enumerate(cells):
-        if isinstance(cell, bool) or not isinstance(cell, (int, float)):
-            wanted = "must be a number: leave the whole row out if it is missing"
-            raise DataError(f"{source}, row {row}", cell, wanted, column=name)
-    return np.array(cells, dtype=np.float64)
 
 
 FORMAT = DataFormat(

@@ -58,7 +58,7 @@ class Target:
         self._sd = np.where(known, best.sd, best.sd / best.level)[kept]
         self._observed = runs.observations[kept]
         besides = sum(
-            run.fitted_besides
+            run.FITTED_BESIDES
             for run, part in zip(runs.runs, runs.slices, strict=True)
             if not known[part].all()
         )
