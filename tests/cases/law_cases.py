@@ -10,7 +10,7 @@ from solver.contacts.kernels.laws import law_force, law_number
 from solver.contacts.kernels.stick_slip_events import new_segments
 from solver.jit import fourier
 
-COULOMB_LINE, GAP_SPRING, POLYNOMIAL, _, COULOMB_CIRCLE, COULOMB_BOX, _ = columns.KERNELS
+COULOMB_LINE, GAP_SPRING, POLYNOMIAL, COULOMB_CIRCLE, COULOMB_BOX, _ = columns.KERNELS
 ELASTIC_NORMAL = COULOMB_LINE  # of two ports
 LOAD_KS = fourier.all_harmonics(1)
 

@@ -138,9 +138,9 @@ def with_proofs(
 ) -> Answer:
     """Return an answer with proofs of peaks; it falls short if one is not proved.
 
-    Arguments as of `stickslip.lab.proofs.certified_peaks.certified_peaks`.
+    Arguments as of `stickslip.lab.proofs.certificate.certified_peaks`.
     """
-    certified_peaks = from_lab("proofs.certified_peaks:certified_peaks")
+    certified_peaks = from_lab("proofs.certificate:certified_peaks")
     return with_certificates(
         answer, certified_peaks(peaks, least_over=least_over, should_stop=watch.should_stop)
     )

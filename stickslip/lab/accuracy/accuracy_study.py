@@ -171,7 +171,7 @@ def _polished(scene: Scene, frequency_hz: float) -> tuple[AccuracyRow, Callable[
     if not scene.contacts or not beside.converged or not is_there(f"{LAB}.proofs"):
         return None
     solve_exactly = from_lab("proofs.exact.answer:solve_exactly")
-    orbit_beside = from_lab("proofs.exact.orbit_at_point:orbit_beside")
+    orbit_beside = from_lab("proofs.exact.orbit:orbit_beside")
     try:
         found = solve_exactly(scene, frequency_hz, beside.n_harmonics, near=beside)
     except SettingError:  # a part of the scene has no place in it: harmonics are all there is

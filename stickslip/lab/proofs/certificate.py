@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from stickslip.lab.proofs.boxes import boxed, claimed, orbit_at, set_out, settled
 from stickslip.lab.proofs.summits import least_proved, peak_proved
 from solver.errors import MissingExtraError, SettingError
-from stickslip.lab.proofs.exact.orbit_at_point import orbit_beside
+from stickslip.lab.proofs.exact.orbit import orbit_beside
 from stickslip.lab.proofs.exact.piecewise import Piecewise
 from solver.response.solution import Solution
 from solver.response.solve import solve
@@ -32,6 +32,10 @@ from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
     from stickslip.lab.proofs.exact.orbit import Orbit as ExactOrbit
+
+
+from collections.abc import Sequence
+
 
 _Bounds = dict[str, tuple[float, float]]
 _BITS = (128, 192, 256)
@@ -290,3 +294,46 @@ def _moved_inward(
     of = raw["system"]["contacts"][contact]
     fixed[key] -= follows * 10.0**step * _MOVED * of["mu"] * abs(of["waves"][0][1])
     return True
+
+
+def certified_peaks(
+    peaks: Sequence[tuple[Scene, float]],
+    *,
+    least_over: str = "",
+    harmonics: int = 11,
+    should_stop: ShouldStop = None,
+) -> tuple[Certificate, ...]:
+    """Prove peaks that were found.
+
+    One alone that is least over a load is proved to be that: if all of the load varies with N0, and where the
+    proof succeeds. Of several each is proved by itself, which does not say that the highest is least.
+
+    Parameters
+    ----------
+    peaks : of each the scene, with the values that make it, and its frequency [Hz].
+    least_over : the path over which the highest is least, within the range.
+    harmonics : highest harmonic of the balance that the search begins with.
+    should_stop : asked now and then, as by `certify`.
+
+    Raises
+    ------
+    SettingError
+        A scene that cannot be certified.
+    MissingExtraError
+        Without python-flint.
+    """
+    for scene, _ in peaks:
+        check_certifiable(scene)
+    near = [solve(scene, frequency_hz=hertz, harmonics=harmonics) for scene, hertz in peaks]
+    if len(near) == 1 and _all_in_proportion(peaks[0][0], least_over):
+        least = certify(near[0], least_over=least_over, should_stop=should_stop)
+        if least.reached or least.status is CertificateStatus.STOPPED:
+            return (least,)
+        return least, certify(near[0], peak=True, should_stop=should_stop)
+    return tuple(certify(each, peak=True, should_stop=should_stop) for each in near)
+
+
+def _all_in_proportion(scene: Scene, path: str) -> bool:
+    """Whether a path is that of a load which varies in proportion to it."""
+    loads = [scene.contacts[i].load for i in loads_of(scene, path)]
+    return bool(loads) and all(load is not None and load.in_proportion for load in loads)

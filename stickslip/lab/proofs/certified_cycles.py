@@ -22,7 +22,7 @@ from solver.errors import SettingError
 from solver.jit.timer import clock
 from solver.jit.fourier import to_complex
 from solver.linear.assembly import linear_model
-from stickslip.lab.proofs.exact.orbit_at_point import begun_at
+from stickslip.lab.proofs.exact.orbit import begun_at
 from stickslip.lab.proofs.exact.flow import Flow, NoMotionError
 from stickslip.lab.proofs.exact.piecewise import Piecewise
 from solver.results.watch import ShouldStop

@@ -16,7 +16,7 @@ from solver.errors import SettingError
 from solver.jit.timer import clock
 from solver.jit.fourier import Real
 from solver.response.contact_response import ContactResponse, ContactState, flags_of
-from stickslip.lab.proofs.exact.orbit_at_point import orbit_beside
+from stickslip.lab.proofs.exact.orbit import orbit_beside
 from stickslip.lab.proofs.exact.flow import (
     LiftsError,
     NoMotionError,
