@@ -1,5 +1,6 @@
 """Each folder of the lab can be taken out: everything else loads, and answers without what it gave."""
 
+import inspect
 import os
 import subprocess
 import sys
@@ -7,10 +8,6 @@ from pathlib import Path
 
 import pytest
 
-import optim
-import solver
-from service.cli.table import command
-from service.jobs.kinds import SHIPPED
 from solver.lab import MissingRoomError, from_lab, rooms
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -25,8 +22,26 @@ GIVES = {
     "widget": ["name explore"], "worst_mistuning": ["study worst-mistuning", "view worst_mistuning"],
 }  # fmt: skip
 """What goes with each folder."""
-_LOADED = """
-import importlib, pkgutil, re, sys
+
+
+def there() -> set[str]:
+    """Names, studies, commands and views of what is loaded."""
+    import re
+
+    import optim
+    import solver
+    from service.cli.table import command
+    from service.http.routes.page import files
+    from service.jobs.kinds import SHIPPED
+
+    names = {f"name {name}" for package in (solver, optim) for name in package.__all__}
+    commands = {f"command {name}" for name in command().commands}
+    views = {f"view {room}" for room in re.findall(r"view as (\w+)", files()["js/lab.js"].decode())}
+    return names | commands | views | {f"study {kind.name}" for kind in SHIPPED}
+
+
+_LOADED = f"""
+import importlib, pkgutil
 import optim, service, solver, stickslip
 for package in (solver, optim, service, stickslip):
     for found in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
@@ -35,18 +50,12 @@ for package in (solver, optim, service, stickslip):
 for package in (solver, optim, stickslip):
     for name in package.__all__:
         getattr(package, name)
-from service.cli.table import command
-from service.jobs.kinds import SHIPPED
 from service.http.app import create_app
-from service.http.routes.page import files
 from service.settings.settings import Settings
-names = {f"name {name}" for package in (solver, optim) for name in package.__all__}
-commands = {f"command {name}" for name in command().commands}
-views = {f"view {room}" for room in re.findall(r"view as (\\w+)", files()["js/lab.js"].decode())}
-there = names | commands | views | {f"study {kind.name}" for kind in SHIPPED}
 assert create_app(Settings(database="sqlite:///lab.db")).openapi()["paths"]
 assert solver.sweep("two-dof", harmonics=3).peak.value > 0.0
-print(*sorted(there), sep="\\n")
+{inspect.getsource(there)}
+print(*sorted(there()), sep="\\n")
 """
 
 
@@ -85,9 +94,7 @@ def test_the_table_knows_every_folder() -> None:
 @pytest.mark.few(keep=["proofs"])
 @pytest.mark.parametrize("room", sorted(GIVES))
 def test_a_folder_can_go(room: str, tmp_path: Path) -> None:
-    names = {f"name {name}" for package in (solver, optim) for name in package.__all__}
-    whole = names | {f"command {name}" for name in command().commands}
-    whole |= {f"study {kind.name}" for kind in SHIPPED}
+    whole = there()
     assert {what for gone in GIVES.values() for what in gone} <= whole
     left = loaded(without(room, tmp_path))
     assert set(GIVES[room]) <= whole - left
