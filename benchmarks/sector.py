@@ -74,7 +74,7 @@ def _true(K: Any, M: Any, near: float) -> float:
     """The frequency [Hz] of the full sector nearest to one of the reduced, by inverse iteration."""
     from scipy.sparse import csc_array
 
-    from solver.matrices.reduction.fixed_interface_modes import factor
+    from solver.matrices.craig_bampton import factor
 
     shift = (2.0 * math.pi * near * 0.999) ** 2
     solve = factor(csc_array(K - shift * M))

@@ -125,7 +125,7 @@ from stickslip.lab.accuracy.accuracy_study import accuracy_study as accuracy_stu
 from .studies.instant import start_of as start_of
 from .studies.interference import interference_diagram as interference_diagram
 from .studies.margin_diagram import margin_diagram as margin_diagram
-from .studies.margin_result import (
+from .studies.study_results import (
     AllowedExcitation as AllowedExcitation,
     MarginDiagram as MarginDiagram,
     MarginStatus as MarginStatus,
@@ -139,7 +139,7 @@ from .studies.study_results import (
     Wave as Wave,
 )
 from .studies.mistuning import mistuning_study as mistuning_study
-from .studies.mistuning_result import (
+from .studies.study_results import (
     MistunedDisk as MistunedDisk,
     MistuningStatus as MistuningStatus,
     MistuningStudy as MistuningStudy,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 from optim.criteria.criterion import Criterion, CriterionRow
 from optim.criteria.peak_criterion import BAND, PEAK
 from solver.continuation.branch import Branch
-from solver.results.notes import MEAN_STRESS_OPEN
+from solver.results.known import MEAN_STRESS_OPEN
 from solver.results.told import json_number
 
 if TYPE_CHECKING:

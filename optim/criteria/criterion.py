@@ -194,7 +194,7 @@ class CriterionRow(Piece):
         "they do not exist; None where the solver has none.",
     ] = field(default=None, compare=False, repr=False)
     flags: Annotated[
-        tuple[str, ...], "What its value assumes or leaves open, see `solver.results.notes.FLAGS`."
+        tuple[str, ...], "What its value assumes or leaves open, see `solver.results.known.FLAGS`."
     ] = ()
 
     def to_json(self) -> dict[str, Any]:

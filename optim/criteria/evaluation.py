@@ -21,7 +21,7 @@ from solver.continuation.walk import ContinuationSettings
 from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene
 from solver.scene.scene_harmonics import even_harmonics_reason
-from solver.studies.peaks.seeds import fitted
+from solver.studies.peaks.peak_lines import fitted
 
 # A response that does not cover its range tells a design nothing; a usual one has 80 to 800 points.
 SETTINGS = ContinuationSettings(most_points=4000, unfinished_peaks=False)

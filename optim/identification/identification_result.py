@@ -8,9 +8,8 @@ from enum import Enum
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from solver.arrays import FloatOrNaN, Real
-from solver.results.base import Drawn
+from solver.results.base import Drawn, Views
 from solver.results.told import Piece
-from solver.results.views import Views
 
 if TYPE_CHECKING:
     from optim.identification.information import Candidate, Untold

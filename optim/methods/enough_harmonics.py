@@ -24,7 +24,7 @@ from solver.response.solution import MEAN_UNDETERMINED
 from solver.results.known import Known
 from solver.results.measures import HALF_PEAK_TO_PEAK
 from solver.results.watch import ShouldStop
-from solver.studies.peaks.seeds import fitted
+from solver.studies.peaks.peak_lines import fitted
 
 CLAIMS = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.APPROXIMATE)
 MOST_HARMONICS = 60  # beyond that a design is not looked at with more

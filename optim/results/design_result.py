@@ -13,12 +13,10 @@ from optim.criteria.peak_criterion import BAND, PEAK
 from optim.problem.checks import Method
 from optim.results.doubts import doubts_of
 from solver.arrays import FloatOrNaN
-from solver.results.base import Drawn, MadeOfResponses
-from solver.results.known import Known, Stable, Verdict, worst
+from solver.results.base import Drawn, MadeOfResponses, Views, on_demand
+from solver.results.known import Known, Note, Stable, Verdict, notes_of_all, worst
 from solver.results.measures import Measured
-from solver.results.notes import Note, notes_of_all
 from solver.results.told import Piece, json_number
-from solver.results.views import Views, on_demand
 
 if TYPE_CHECKING:
     from optim.criteria.constraint_rows import DesignEvaluation

@@ -6,8 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from solver.results.known import Known
-from solver.results.notes import flag_words, notes_of_all
+from solver.results.known import Known, flag_words, notes_of_all
 
 if TYPE_CHECKING:
     from optim.criteria.constraint_rows import DesignEvaluation

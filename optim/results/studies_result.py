@@ -9,12 +9,10 @@ from enum import Enum
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 from solver.arrays import FloatOrNaN
-from solver.results.base import Drawn, MadeOfResponses
-from solver.results.known import Known
+from solver.results.base import Drawn, MadeOfResponses, Views
+from solver.results.known import NOTHING_DAMPS, Known
 from solver.results.measures import Measured
-from solver.results.notes import NOTHING_DAMPS
 from solver.results.told import Piece
-from solver.results.views import Views
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:

@@ -14,12 +14,10 @@ from optim.criteria.peak_criterion import PEAK
 from optim.problem.checks import Aim
 from optim.results.design_result import DesignStatus
 from solver.arrays import FloatOrNaN
-from solver.results.base import Drawn, MadeOfResponses
-from solver.results.known import NOTHING_KNOWN, Known
-from solver.results.notes import Note
+from solver.results.base import Drawn, MadeOfResponses, Views
+from solver.results.known import NOTHING_KNOWN, Known, Note
 from solver.results.order_statistics import quantile_json
 from solver.results.told import Piece, json_number
-from solver.results.views import Views
 
 if TYPE_CHECKING:
     from optim.methods.linearised import Conditions

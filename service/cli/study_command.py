@@ -23,7 +23,7 @@ from service.jobs.study import Answer, Study, Watch, Writable
 from service.rendering.text import show
 from solver.errors import SettingError
 from solver.jit.compiler_process import cost, prepare
-from solver.results.views import on_demand
+from solver.results.base import on_demand
 from solver.results.watch import stopped_by_interrupt
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from service.cli.failures import REPORTED, report
 from service.cli.options.inputs import join_words
 from service.jobs.names import home_of
 from solver.lab import LAB, is_there
-from solver.results.views import on_demand
+from solver.results.base import on_demand
 
 STUDY = "study"
 

@@ -246,7 +246,7 @@ def _refuse_inflating(file: Path) -> None:
 def _nodes_of(file: Path) -> int:
     """How many nodes a deck has."""
     from solver.matrices.readers.numbers_in_text import FormatError
-    from solver.matrices.readers.reader import MatrixFileError
+    from solver.matrices.readers.reader_registry import MatrixFileError
     from solver.matrices.sectors.decks import check_alone, read_deck
 
     try:

@@ -19,8 +19,8 @@ from solver.errors import FieldError, Issue, SceneError, Shown
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from solver.matrices.craig_bampton import Reduced
     from solver.matrices.load_set import MatrixSet
-    from solver.matrices.reduction.craig_bampton import Reduced
     from solver.matrices.sectors.sector_reduction import ReducedSector
     from solver.scene.scene import Scene
 
@@ -125,8 +125,8 @@ def _lowest(given: MatrixSet, notes: list[str]) -> NDArray[Any] | None:
     import numpy as np
     from scipy.sparse import csc_array
 
+    from solver.matrices.craig_bampton import held_modes, interior
     from solver.matrices.diagnostics import refuse
-    from solver.matrices.reduction.fixed_interface_modes import held_modes, interior
 
     matrices = given.matrices
     size = matrices["K"].shape[0]

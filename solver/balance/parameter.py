@@ -14,7 +14,7 @@ from solver.contacts.kernels import columns
 from solver.contacts.kernels import system as kernel
 from solver.errors import SettingError
 from solver.jit.fourier import Real
-from solver.scene.bodies.paths import SPEED
+from solver.scene.bodies.shape_parts import SPEED
 from solver.scene.parameter_paths import FREQUENCY, check_frequency, follows_speed, parameter_of
 from solver.scene.scene import Scene
 

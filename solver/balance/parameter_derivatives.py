@@ -19,7 +19,7 @@ from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import structure_derivative
 from solver.linear.condensation import reduce_model, term_amplitudes
 from solver.linear.model import ExtraTerms, LinearModelDerivative
-from solver.scene.bodies.paths import FORCE
+from solver.scene.bodies.shape_parts import FORCE
 from solver.scene.cyclic.annulus import check_in_annulus
 from solver.scene.parameter_paths import follows_speed, parameter_of
 from solver.scene.scene import MatricesStructure, Scene

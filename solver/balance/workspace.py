@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,9 +18,9 @@ from solver.balance.kernels.mechanics import ALLOWED, unaccounted
 from solver.balance.kernels.newton import from_stuck, ladder, newton, stuck_start
 from solver.balance.kernels.output import MEASURES
 from solver.balance.kernels.residual import evaluate
-from solver.balance.known_springs import KnownSprings
 from solver.balance.mean_loads import friction_can_hold, may_stick
-from solver.balance.softening import solve_softened
+from solver.balance.parameter import Kind
+from solver.contacts.kernels.columns import KT, KT_SECOND
 from solver.contacts.kernels.stick_slip_events import FAILED, STUCK
 from solver.contacts.kernels.system import (
     UNHELD,
@@ -33,9 +34,38 @@ from solver.contacts.kernels.system import (
     of_all_ports,
     receptance_by_value,
 )
-from solver.jit.fourier import Integer, Real, coefficient_count
+from solver.jit.fourier import Complex, Integer, Real, coefficient_count
 from solver.linear.kernels.receptance import receptance
 from solver.scene.scene_harmonics import spread
+
+MOST_ENTRIES = 1_000_000  # 16 MB; beyond, they are worked out anew
+
+
+class KnownSprings:
+    """ĝ at solutions, see `solver.balance.kernels.linearised_contacts.fill_springs`; by the bits of these.
+
+    They are kept where forces are dear, and over the frequency alone, where resonances are looked for.
+    """
+
+    def __init__(self, system: System, kind: Kind) -> None:
+        self._shape = system.ks.size, int(system.first_block[-1])
+        self._wanted = kind is Kind.FREQUENCY and bool(system.alone.any())
+        self._known: dict[bytes, Complex] = {}
+
+    def rows(self, count: int) -> Complex:
+        """Return empty rows for `count` solutions; none where they are not kept."""
+        full = (len(self._known) + count) * self._shape[0] * self._shape[1] > MOST_ENTRIES
+        return np.empty((0 if full or not self._wanted else count, *self._shape), np.complex128)
+
+    def keep(self, solutions: Real, springs: Complex) -> None:
+        """Keep the springs (at least P, or no row) of solutions (P, nt + 1), λ last."""
+        if len(springs):
+            self._known |= {row.tobytes(): one for row, one in zip(solutions, springs, strict=False)}
+
+    def of(self, solutions: Real) -> list[Complex | None]:
+        """Return the springs (nk, blocks) of solutions (P, nt + 1), None where they are not known."""
+        return [self._known.get(row.tobytes()) for row in solutions]
+
 
 # The mean and the first: with these Newton's method from full stick nearly always ends well.
 FEWEST_HARMONICS = 2
@@ -414,3 +444,40 @@ class Workspace:
         observed, values = np.zeros(self.balance.n_coefficients), np.zeros(MEASURES)
         good = slope_by_parameter(self.system, self.linear, u, self.point, observed, values)
         return PointMeasures(observed=observed, values=values) if good else None
+
+
+SOFTEST = 1e-4  # share of the stiffness to begin with
+_FACTOR, _LARGEST, _LEAST = 10.0, 100.0, 1.1  # from one stiffness to the next
+_FEW = 8  # iterations up to which the next factor is larger
+
+
+def solve_softened(
+    system: System, linear: Receptance, point: Evaluation, u: Real, p: float
+) -> tuple[bool, int, float]:
+    """Raise the tangential stiffness of every contact to its own, the result in `u`; as `newton`.
+
+    Stiff contacts that slip far beyond what their springs give are nearly rigid friction, where Newton's
+    method from full stick wanders. With springs so soft that no contact slips the response is found at once;
+    on the way to the stiffness given each solution is the guess of the next.
+    """
+    contacts, own = system.contacts, by_reference(system)
+
+    def softened(share: float) -> System:
+        table = contacts.copy()
+        table[:, [KT, KT_SECOND]] *= share
+        return by_reference(system._replace(contacts=table))
+
+    here, factor = SOFTEST, _FACTOR
+    good, spent, norm = from_stuck(softened(here), linear, u, p, point)
+    while good and here < 1.0:
+        ahead, trial = min(1.0, here * factor), u.copy()
+        receptance(own, p, linear)
+        closer, more, norm = newton(softened(ahead), linear, trial, p, 0.0, point)
+        spent += more
+        if closer:
+            u[:], here = trial, ahead
+            factor = min(_LARGEST, factor**2) if more <= _FEW else factor
+        else:
+            factor = math.sqrt(factor)
+            good = factor > _LEAST
+    return bool(good), int(spent), float(norm) if good else np.inf

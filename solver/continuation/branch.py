@@ -16,11 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import FloatOrNaN, Integer, Real
-from solver.results.base import Drawn
-from solver.results.known import Known, Stable, Verdict
-from solver.results.notes import NOTHING_DAMPS, Note
+from solver.results.base import Drawn, Views, on_demand
+from solver.results.known import NOTHING_DAMPS, Known, Note, Stable, Verdict
 from solver.results.told import Piece
-from solver.results.views import Views, on_demand
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:

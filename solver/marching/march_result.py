@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 
 from solver.arrays import FloatOrNaN, Integer, Real
-from solver.results.base import Drawn
-from solver.results.views import Data, Views
+from solver.results.base import Data, Drawn, Views
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,9 +12,8 @@ from scipy.sparse import coo_array, issparse
 
 from solver.matrices.labels import Label
 from solver.matrices.readers import reader_registry as registry
-from solver.matrices.readers.array_parts import MOST_ROWS, Labelled
-from solver.matrices.readers.reader import ROLES, Reader
-from solver.matrices.readers.reader import MatrixFileError as MatrixFileError
+from solver.matrices.readers.reader_registry import MOST_ROWS, ROLES, Labelled, Reader
+from solver.matrices.readers.reader_registry import MatrixFileError as MatrixFileError
 from solver.matrices.values import NormalModes
 
 _LABELS_OF_ONES_OWN = ".dof"

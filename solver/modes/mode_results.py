@@ -12,8 +12,7 @@ import numpy as np
 
 from solver.arrays import Complex, Integer, Real
 from solver.errors import SettingError, check_count
-from solver.results.base import Drawn
-from solver.results.views import Data, Views
+from solver.results.base import Data, Drawn, Views
 from solver.scene.scene import Scene
 from solver.wording import listing
 

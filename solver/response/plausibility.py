@@ -27,7 +27,7 @@ from solver.linear.model import Identity, LinearModel
 from solver.linear.natural_frequencies import LARGE, Resonances, resonances
 from solver.matrices.normal_modes import hermitian, least_stiffness, undamped_modes
 from solver.results import units
-from solver.results.notes import Note
+from solver.results.known import Note
 from solver.scene.cyclic.annulus import written_out
 from solver.scene.scene import Scene
 from solver.wording import listing

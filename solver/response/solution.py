@@ -11,10 +11,8 @@ import numpy as np
 
 from solver.arrays import FloatOrNaN, Real
 from solver.errors import SettingError
-from solver.results.base import Drawn
-from solver.results.known import Stable, Verdict
-from solver.results.notes import Note
-from solver.results.views import Views, on_demand
+from solver.results.base import Drawn, Views, on_demand
+from solver.results.known import Note, Stable, Verdict
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:

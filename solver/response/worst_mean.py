@@ -48,7 +48,7 @@ from solver.response.held_contacts import (
 )
 from solver.response.solution import MEAN_UNDETERMINED, Solution
 from solver.response.solve import describe
-from solver.results.notes import MEAN_STRESS_OPEN, WORST_MEAN
+from solver.results.known import MEAN_STRESS_OPEN, WORST_MEAN
 from solver.scene.materials import ENDLESS
 from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Gradient, Sensitivities

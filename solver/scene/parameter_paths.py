@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 from solver.contacts.laws.contact_law import AnyContact
 from solver.errors import SettingError
 from solver.results.units import number
-from solver.scene.bodies import paths as of_bodies
+from solver.scene.bodies import shape_parts as of_bodies
 from solver.scene.bodies.shape_parts import own_parts, shape_parameter, shape_paths
 from solver.scene.excitation import AMPLITUDE as AMPLITUDE
 from solver.scene.excitation import PHASE as PHASE

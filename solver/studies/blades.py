@@ -20,10 +20,9 @@ from solver.jit.fourier import Real
 from solver.jit.trig_polynomial import grid_size, grid_tables, on_grid
 from solver.response.solution import Solution
 from solver.response.time_history import motion
-from solver.results.base import Drawn, MadeOfResponses
+from solver.results.base import Data, Drawn, MadeOfResponses, Views
 from solver.results.known import NOTHING_KNOWN, Known
 from solver.results.measures import OF_X, Measured
-from solver.results.views import Data, Views
 from solver.results.watch import shows_progress
 from solver.scene.cyclic.annulus import annulus, sectors_needed
 from solver.scene.scene import Scene

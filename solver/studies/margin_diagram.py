@@ -30,7 +30,7 @@ from solver.scene.parameter_paths import AMPLITUDE, parameter_of
 from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Sensitivities
 from solver.sensitivity.nonsmooth import peak_gradient
-from solver.studies.margin_result import AllowedExcitation, MarginDiagram, MarginStatus
+from solver.studies.study_results import AllowedExcitation, MarginDiagram, MarginStatus
 
 AS_IT_IS = "as it is"
 POINTS = 9

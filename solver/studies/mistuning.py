@@ -18,7 +18,7 @@ from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.scene import Scene
 from solver.scene.scene_records import LumpedStructure, Mistuning
 from solver.studies.blades import BladePeaks, blade_peaks, mistuned, with_mistuning
-from solver.studies.mistuning_result import MistunedDisk, MistuningStatus, MistuningStudy
+from solver.studies.study_results import MistunedDisk, MistuningStatus, MistuningStudy
 
 MOST_SAMPLES = 1_000_000
 

@@ -57,7 +57,7 @@ def harmonics(coefficients: Real, dims: tuple[str, ...], name: str, unit: str) -
 
 
 def described(found: Shown) -> Dataset:
-    """What the class of a result says of its data set, see `solver.results.views.Data`."""
+    """What the class of a result says of its data set, see `solver.results.base.Data`."""
     data = found.DATA
     variables: dict[str, Variable] = {}
     for place, names in data.columns.items():

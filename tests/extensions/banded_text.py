@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.matrices.readers.reader import Reader
+from solver.matrices.readers.reader_registry import Reader
 
 
 def banded(path: Path, _key: str) -> np.ndarray:

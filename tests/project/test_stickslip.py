@@ -16,7 +16,7 @@ import stickslip.lab
 from service.client.client import Client
 from service.errors import ServiceProblem
 from service.jobs.kinds import studies
-from solver.results.views import Views, on_demand
+from solver.results.base import Views, on_demand
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 HEAVY = {"numba", "llvmlite", "numpy", "scipy", "pydantic", "casadi", "httpx", "typer", "rich", "matplotlib"}

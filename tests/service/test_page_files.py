@@ -12,7 +12,7 @@ from service_helpers import ServedClient, is_problem
 from service.http import made_once
 from service.http.routes import page
 from service.http.routes.page import bundle
-from solver.results.notes import FLAGS
+from solver.results.known import FLAGS
 
 FOLDER = Path(page.__file__).resolve().parents[2] / "page"
 LAB = FOLDER.parents[1] / "stickslip" / "lab"

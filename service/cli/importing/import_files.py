@@ -88,9 +88,8 @@ def _parts(texts: Sequence[str] | None) -> dict[str, Path | None]:
 
 def read_sources(found: Sources, deck: Path | None) -> MatrixSet | None:
     """The matrices in SI units, along the global axes whatever frames the deck has; None for modes."""
-    from solver.matrices.load_set import PART, in_si, read_set
+    from solver.matrices.load_set import PART, in_global, in_si, read_set
     from solver.matrices.matrix_files import MatrixFileError
-    from solver.matrices.node_frames import in_global
     from solver.matrices.readers.numbers_in_text import FormatError
     from solver.matrices.sectors.decks import read_deck
 

@@ -21,8 +21,8 @@ from solver.results.files import whole
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from solver.matrices.craig_bampton import Reduced
     from solver.matrices.load_set import MatrixSet
-    from solver.matrices.reduction.craig_bampton import Reduced
     from solver.matrices.sectors.sector_reduction import ReducedSector
 
 
@@ -83,7 +83,7 @@ class ReducedModel:
 
 def reduced_file(asked: ImportOptions, target: Path) -> Path:
     """Where the reduced model, or the reduced sector, goes, which must not exist."""
-    from solver.matrices.reduction.craig_bampton import WRITTEN
+    from solver.matrices.craig_bampton import WRITTEN
 
     name = asked.reduced or str(target.with_name(f"{target.stem}-reduced.npz"))
     return new_file("--reduced", name, WRITTEN if asked.sectors is None else (".npz",))
@@ -93,9 +93,9 @@ def reduce(
     given: MatrixSet, rows: Mapping[str, int], modes: int | None, up_to: float | None, path: Path
 ) -> ReducedModel:
     """Reduce matrices onto the DOFs in `rows` and write them to `path`."""
+    from solver.matrices.craig_bampton import craig_bampton, write_reduced
     from solver.matrices.diagnostics import refuse
     from solver.matrices.matrix_validation import DofTable
-    from solver.matrices.reduction.craig_bampton import craig_bampton, write_reduced
 
     if (modes is None) == (up_to is None):
         raise InputError(

@@ -102,8 +102,7 @@ class Patches:
         self, name: str, given: object, faces: tuple[list[int], list[int] | None], turn: Any, pairing: object
     ) -> tuple[list[float], list[_Touched]]:
         """The normal, and each node of the first face with what it touches of the second."""
-        from solver.matrices.faces import face
-        from solver.matrices.mortar import mortar
+        from solver.matrices.mortar import face, mortar
 
         first, second = faces
         if pairing == "mortar" and second is not None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel, ConfigDict, Field, create_model
 from pydantic.fields import FieldInfo
 
-from solver.results.views import on_demand
+from solver.results.base import on_demand
 
 if TYPE_CHECKING:
     from solver.results.told import Told
@@ -67,8 +67,7 @@ def result_model(
     """
     from solver.results.base import MadeOfResponses
     from solver.results.known import Known
-    from solver.results.read_back import declared
-    from solver.results.told import json_keys
+    from solver.results.told import declared, json_keys
 
     known = (Known,) if issubclass(kind, MadeOfResponses) and not only else ()
     keys = {key: (of, path) for of in (*known, kind) for key, path in json_keys(of).items()}

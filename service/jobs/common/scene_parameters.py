@@ -12,7 +12,7 @@ from pydantic.fields import FieldInfo
 from optim.problem.problem_keys import ABOVE, BELOW, default_variable
 from solver.contacts.laws.contact_parts import Span
 from solver.errors import SettingError
-from solver.scene.bodies.paths import SPEED
+from solver.scene.bodies.shape_parts import SPEED
 from solver.scene.parameter_paths import parameter_of
 from solver.scene.scene import AnyContact, Scene
 

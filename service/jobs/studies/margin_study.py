@@ -32,7 +32,7 @@ class Margin(Study, HarmonicRequest):
     EXAMPLES = ({"scene": "two-dof", "from": 10, "to": 200, "limit": 2.0},)
     NAME, FUNCTION = "margin", "solver:margin_diagram"
     RESULT = answered(
-        "solver.studies.margin_result:MarginDiagram", "MarginResult", stress=list[Curve], used=list[Curve]
+        "solver.studies.study_results:MarginDiagram", "MarginResult", stress=list[Curve], used=list[Curve]
     )
     TOLD = "solver.views.tables.tracks:margin"
     SHOWS = "stress over the excitation, what each damper allows ([criteria](criteria.md))"

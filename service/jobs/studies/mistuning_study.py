@@ -78,7 +78,7 @@ def part_issues(attempt: Callable[[], object]) -> list[Issue]:
 
 
 mistuning_result = answered(
-    "solver.studies.mistuning_result:MistuningStudy", "MistuningResult", dof=str, samples=list[Table],
+    "solver.studies.study_results:MistuningStudy", "MistuningResult", dof=str, samples=list[Table],
     quantiles=list[Table],
     worst=Table | None,
 )  # fmt: skip

@@ -22,7 +22,7 @@ from service.rendering.report.about import about_section
 from solver.continuation.branch import AnyBranch, Branch
 from solver.continuation.branches.observation import observing
 from solver.results import units
-from solver.results.notes import flag_words
+from solver.results.known import flag_words
 from solver.scene.parameter_paths import parameter
 from solver.scene.scene import Scene
 from solver.scene.scene_records import LumpedStructure

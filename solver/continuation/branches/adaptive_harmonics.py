@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.balance.balance import Balance
+from solver.balance.balance import Balance, less_harmonics, more_harmonics, pad
 from solver.balance.kernels.output import HALF_RANGE, MAX_ABS
-from solver.balance.more_harmonics import less_harmonics, more_harmonics, pad
 from solver.balance.workspace import PointSolution, Workspace
 from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.extrema.error_estimate import ErrorEstimator

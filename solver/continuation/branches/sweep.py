@@ -52,9 +52,9 @@ from solver.continuation.walk import ContinuationSettings, walk
 from solver.errors import SettingError
 from solver.jit.fourier import Real, to_full
 from solver.jit.timer import clock
-from solver.results.notes import ABOVE_FRICTION
+from solver.results.known import ABOVE_FRICTION
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
-from solver.scene.bodies.paths import SPEED
+from solver.scene.bodies.shape_parts import SPEED
 from solver.scene.parameter_paths import FREQUENCY
 from solver.scene.scene import Scene
 

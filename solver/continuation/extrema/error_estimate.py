@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from solver.balance.balance import less_harmonics, linear_part, more_harmonics, pad
 from solver.balance.kernels.haigh import utilisation
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.output import extremes, observed_motion
 from solver.balance.kernels.residual import evaluate
-from solver.balance.more_harmonics import less_harmonics, linear_part, more_harmonics, pad
 from solver.balance.rounding import observed_rounding
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import (

@@ -19,9 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.matrices.labels import Label, component, distinct, label, node_number
-from solver.matrices.readers.array_parts import MOST_ROWS, Labelled, mirrored
 from solver.matrices.readers.numbers_in_text import LARGEST, FormatError, ascii_lines, table, whole_numbers
-from solver.matrices.readers.reader import Reader
+from solver.matrices.readers.reader_registry import MOST_ROWS, Labelled, Reader, mirrored
 
 _HELD = 1e30  # diagonal entries from here on are the penalty of a boundary condition
 _LINE = "node, DOF, node, DOF and value (or row, column and value)"

@@ -11,8 +11,7 @@ import numpy as np
 from scipy.io import loadmat
 from scipy.sparse import bsr_array, coo_array, csc_array, csr_array, dia_array
 
-from solver.matrices.readers.array_parts import chosen, wanted
-from solver.matrices.readers.reader import MatrixFileError, Reader
+from solver.matrices.readers.reader_registry import MatrixFileError, Reader, chosen, wanted
 from solver.matrices.values import MODES_KEYS
 
 

@@ -16,10 +16,15 @@ from scipy.sparse import coo_array
 
 from solver.matrices.decks.nastran import bulk_entries
 from solver.matrices.labels import Label, component
-from solver.matrices.readers.array_parts import Labelled, chosen_by_initials, mirrored, named_by_role
 from solver.matrices.readers.numbers_in_text import LARGEST, FormatError, ascii_lines, fortran_real
 from solver.matrices.readers.output4 import SQUARE, SYMMETRIC
-from solver.matrices.readers.reader import Reader
+from solver.matrices.readers.reader_registry import (
+    Labelled,
+    Reader,
+    chosen_by_initials,
+    mirrored,
+    named_by_role,
+)
 
 
 @dataclass(slots=True)

@@ -27,7 +27,7 @@ from scipy.sparse import csc_array
 
 from solver.matrices.labels import Label, component, distinct, node_number
 from solver.matrices.readers.numbers_in_text import LARGEST, FormatError, ascii_lines
-from solver.matrices.readers.reader import Reader
+from solver.matrices.readers.reader_registry import Reader
 
 _INTEGERS = re.compile(r"\(?\s*(\d*)\s*I\s*(\d+)(?:\.\d+)?\s*\)?")
 _REALS = re.compile(

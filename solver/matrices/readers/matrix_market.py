@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
 from solver.matrices.readers.numbers_in_text import LARGEST, FormatError, ascii_lines, no_number
-from solver.matrices.readers.reader import Reader
+from solver.matrices.readers.reader_registry import Reader
 
 _FIELDS = {"real": 1, "integer": 1, "complex": 2}
 _SYMMETRIES = ("general", "symmetric", "skew-symmetric", "hermitian")

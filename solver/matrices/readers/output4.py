@@ -23,9 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
-from solver.matrices.readers.array_parts import MOST_ROWS, chosen_by_initials, mirrored, named_by_role
 from solver.matrices.readers.numbers_in_text import FormatError, ascii_lines, fortran_real
-from solver.matrices.readers.reader import Reader
+from solver.matrices.readers.reader_registry import (
+    MOST_ROWS,
+    Reader,
+    chosen_by_initials,
+    mirrored,
+    named_by_role,
+)
 
 SQUARE, RECTANGULAR, SYMMETRIC = 1, 2, 6
 _FORMS = {3: "diagonal", 4: "lower triangular", 5: "upper triangular", 8: "identity", 7: "row"}

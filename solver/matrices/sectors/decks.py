@@ -13,7 +13,7 @@ from solver.matrices.decks.deck import positions as positions
 from solver.matrices.decks.keywords import KeywordDeck
 from solver.matrices.decks.nastran import read_nastran
 from solver.matrices.readers.numbers_in_text import FormatError
-from solver.matrices.readers.reader import Reader
+from solver.matrices.readers.reader_registry import Reader
 
 _KEYWORDS = re.compile(r"\s*\*\s*(NODE|INCLUDE|PART)\s*(,|$)", re.IGNORECASE)
 _ANSYS = re.compile(r"\s*(NBLOCK|N)\s*,", re.IGNORECASE)

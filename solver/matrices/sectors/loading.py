@@ -16,7 +16,7 @@ from solver.matrices.labels import COMPONENTS, OWN_COMPONENTS, Label
 from solver.matrices.load_set import MatrixSet
 from solver.matrices.matrix_validation import DofTable
 from solver.matrices.readers.numbers_in_text import FormatError
-from solver.matrices.readers.reader import MatrixFileError
+from solver.matrices.readers.reader_registry import MatrixFileError
 from solver.matrices.sectors.decks import Deck, read_deck
 from solver.matrices.sectors.elimination import Elimination, Group, elimination, rotation
 from solver.matrices.sectors.outline import SectorOutline, outline_of

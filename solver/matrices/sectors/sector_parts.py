@@ -1,4 +1,4 @@
-"""Parts of a sector that mistuning scales: their matrices, and what a reduction leaves of them."""
+"""What a sector brings beside its matrices: parts that mistuning scales, matrices of nodal diameters."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.matrices.values import ByContent, Matrix, Named, differs
+from solver.errors import SettingError
+from solver.matrices.sectors.outline import OutlineMotion
+from solver.matrices.values import MOST_DOFS, ByContent, Matrix, Named, differs
 
 ComplexArray = NDArray[np.complex128]
 WHOLE = ("K", "M")  # names for the stiffness and the mass of a whole sector
@@ -144,3 +146,152 @@ def _numbers(key: str, item: Any) -> ComplexArray:
     if real.shape != imag.shape:
         raise ValueError(f"`parts`: `{key}`: `real` and `imag` must be of one size")
     return np.asarray(real + 1j * imag)
+
+
+_KEYS = ("diameters", "M", "K", "C", "parts", "motion")
+_MOST = 5001  # nodal diameters of the largest disk
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DiameterMatrices(ByContent):
+    """M, K and maybe C of one sector at some nodal diameters; equal to another with the same content.
+
+    The first coordinates are DOFs, the same at each nodal diameter; the others may be modes of their own.
+    """
+
+    diameters: Annotated[
+        tuple[int, ...],
+        "Ascending, each from 0 to half the number of sectors; that of n backward is the complex conjugate.",
+    ]
+    M: Annotated[ComplexArray, "Hermitian and read-only, (nd, n, n)."]
+    K: Annotated[ComplexArray, "As M."]
+    C: Annotated[ComplexArray | None, "(nd, n, n)."] = None
+    parts: Annotated[PartsAcross | None, "Parts that mistuning may scale, between the nodal diameters."] = (
+        None
+    )
+    motion: Annotated[OutlineMotion | None, "Of the outline of the mesh, to be drawn."] = None
+    digest: Annotated[str, "Hash of the content."] = field(init=False)
+
+    def __post_init__(self) -> None:
+        given = {"M": self.M, "K": self.K} | ({} if self.C is None else {"C": self.C})
+        if not self.diameters or list(self.diameters) != sorted(set(self.diameters)) or self.diameters[0] < 0:
+            raise ValueError(
+                f"`diameters` must be ascending whole numbers >= 0, at least one, got {self.diameters}"
+            )
+        kept = {}
+        for key, value in given.items():
+            array = np.array(value, dtype=np.complex128)
+            wanted = (len(self.diameters), array.shape[-1], array.shape[-1])
+            if array.ndim != 3 or array.shape != wanted or not array.size:
+                raise ValueError(
+                    f"`{key}` must have a square matrix for each of the {len(self.diameters)} nodal "
+                    f"diameters, got {' x '.join(map(str, array.shape))}"
+                )
+            if array.shape[-1] > MOST_DOFS or array.shape != np.shape(self.M):
+                raise ValueError(f"`{key}` must have at most {MOST_DOFS} rows, as many as `M`")
+            if not np.isfinite(array).all():
+                raise ValueError(f"`{key}` must hold finite numbers")
+            turned = np.swapaxes(array.conj(), 1, 2)
+            if differs(array, turned):
+                raise ValueError(f"`{key}` must be Hermitian at each nodal diameter")
+            kept[key] = 0.5 * (array + turned)
+        besides = [each.digest for each in (self.parts, self.motion) if each is not None]
+        self._hold(kept, self.diameters, *besides)
+        for n, mass in zip(self.diameters, self.M, strict=True):
+            try:
+                np.linalg.cholesky(mass)
+            except np.linalg.LinAlgError as error:
+                raise ValueError(f"`M` must be positive definite at nodal diameter {n}") from error
+        if self.parts is not None:
+            self.parts.check(len(self.diameters), self.size)
+        if self.motion is not None:
+            self.motion.check(len(self.diameters), self.size)
+
+    def __repr__(self) -> str:
+        listed = ", ".join(map(str, self.diameters))
+        return f"DiameterMatrices({self.size} coordinates, nodal diameters {listed}, {self.digest[:12]})"
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return int(self.M.shape[1])
+
+    def at(self, n: int, sectors: int) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+        """K, C and M at nodal diameter n, from 0 to half the sectors; real where the phase is.
+
+        Raises
+        ------
+        SettingError
+            The model was not reduced for it.
+        """
+        if n not in self.diameters:
+            built = ", ".join(map(str, self.diameters))
+            raise SettingError(
+                "nodal diameter",
+                n,
+                f"must be one that the model was reduced for ({built}): harmonics of this engine order call "
+                "for it; reduce again with more of them, or ask for fewer harmonics",
+            )
+        i = self.diameters.index(n)
+        C = np.zeros_like(self.K[i]) if self.C is None else self.C[i]
+        found = self.K[i], C, self.M[i]
+        return found if 2 * n % sectors else (found[0].real, found[1].real, found[2].real)
+
+    @classmethod
+    def read(cls, data: object) -> DiameterMatrices:
+        """Read a table of `diameters`, lists `M`, `K`, `C` of tables `real`, `imag`; `parts`, `motion`."""
+        if isinstance(data, DiameterMatrices):
+            return data
+        if isinstance(data, str):
+            raise ValueError(
+                "`diameters` must be given inline here: files are read by load_scene only, got the path "
+                f"{data[:80]!r}"
+            )
+        if not isinstance(data, dict) or not {"diameters", "M", "K"} <= set(data) <= set(_KEYS):
+            got = ", ".join(map(str, data))[:200] if isinstance(data, dict) else type(data).__name__
+            raise ValueError(f"`diameters` must be a table with the keys {', '.join(_KEYS)}, got {got}")
+        counts = data["diameters"]
+        good = isinstance(counts, list | tuple) and 0 < len(counts) <= _MOST
+        if not good or any(isinstance(n, bool) or not isinstance(n, int) for n in counts):
+            raise ValueError("`diameters` must be a list of whole numbers")
+        given = ("M", "K") if data.get("C") is None else ("M", "K", "C")
+        arrays = {key: _stack(key, data[key], len(counts)) for key in given}
+        parts = None if data.get("parts") is None else PartsAcross.read(data["parts"])
+        motion = None if data.get("motion") is None else OutlineMotion.read(data["motion"])
+        return cls(diameters=tuple(counts), parts=parts, motion=motion, **arrays)
+
+    def write(self) -> dict[str, object]:
+        """The table that `read` reads."""
+        table: dict[str, object] = {"diameters": list(self.diameters)}
+        given = {"M": self.M, "K": self.K, "C": self.C}
+        for key, value in given.items():
+            if value is not None:
+                table[key] = [_written(matrix) for matrix in value]
+        if self.parts is not None:
+            table["parts"] = self.parts.write()
+        if self.motion is not None:
+            table["motion"] = self.motion.write()
+        return table
+
+
+def _stack(key: str, data: object, count: int) -> ComplexArray:
+    if not isinstance(data, list | tuple) or len(data) != count:
+        raise ValueError(f"`{key}` must have a table `real`, `imag` for each of the {count} nodal diameters")
+    return np.array([_complex(key, item) for item in data])
+
+
+def _complex(key: str, item: Any) -> ComplexArray:
+    if not isinstance(item, dict) or not {"real"} <= set(item) <= {"real", "imag"}:
+        raise ValueError(f"`{key}` must hold tables with the keys `real` and `imag`")
+    real = Matrix.read(item["real"]).array
+    imag = Matrix.read(item["imag"]).array if "imag" in item else np.zeros_like(real)
+    if imag.shape != real.shape:
+        raise ValueError(f"`{key}`: `real` and `imag` must be of one size")
+    return np.asarray(real + 1j * imag, dtype=np.complex128)
+
+
+def _written(matrix: ComplexArray) -> dict[str, object]:
+    table: dict[str, object] = {"real": Matrix(matrix.real).write()}
+    if np.any(matrix.imag):
+        table["imag"] = Matrix(matrix.imag).write()
+    return table

@@ -24,8 +24,7 @@ from solver.jit.fourier import Real
 from solver.modes.mode_results import NonlinearMode
 from solver.modes.mode_start import LinearMode, coordinates_of, linear_modes
 from solver.modes.nonlinear_mode import nonlinear_mode, pose
-from solver.results.base import Drawn
-from solver.results.views import Data, Views
+from solver.results.base import Data, Drawn, Views
 from solver.scene.scene import Scene
 
 _SAME = 1e-9  # relative difference of forces that are proportional

@@ -9,9 +9,8 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from solver.arrays import Complex
-from solver.results.base import Drawn
+from solver.results.base import Drawn, Views
 from solver.results.known import Stable, Verdict
-from solver.results.views import Views
 
 GROWS = 1e-9  # a multiplier's modulus beyond 1 that is more than rounding
 REAL = 1e-7  # imaginary part, relative to the modulus, that counts as none

@@ -19,7 +19,7 @@ from solver.continuation.branch import Branch, Peak
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, Z
 from solver.jit.timer import clock
 from solver.studies.peaks.envelope_minimum import Lowest, rows_at
-from solver.studies.peaks.track import Look
+from solver.studies.peaks.survey import Look
 from solver.studies.peaks.track_results import ChosenBy, LeastPeak
 from solver.studies.peaks.tracker import Tracker
 

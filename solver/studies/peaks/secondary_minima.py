@@ -15,8 +15,8 @@ import numpy as np
 from solver.continuation.extrema.kernels.peak_continuation import HEIGHT
 from solver.jit.fourier import Real
 from solver.studies.peaks.envelope_minimum import Lowest, flat, minima
+from solver.studies.peaks.survey import HaltedError
 from solver.studies.peaks.tracker import Tracker
-from solver.studies.peaks.work_limit import HaltedError
 
 NEAR = 1.05  # times the best peak: how high further basins may be that are looked for
 APART = 0.08  # share of the range: no look is made between places closer than that

@@ -19,12 +19,11 @@ from solver.jit.fourier import Real
 from solver.jit.timer import clock
 from solver.results.watch import shows_progress
 from solver.scene.scene import Scene
-from solver.studies.peaks.minimise_peak import COMPETES, MOST_LOOKS, THOROUGHLY, halted, prove
-from solver.studies.peaks.proof import EQUAL
-from solver.studies.peaks.seeds import Line, LineEnd
+from solver.studies.peaks.minimise_peak import COMPETES, EQUAL, MOST_LOOKS, THOROUGHLY, halted, prove
+from solver.studies.peaks.peak_lines import Line, LineEnd
+from solver.studies.peaks.survey import RESPONSES, Allowance, HaltedError
 from solver.studies.peaks.track_results import CompetingPeak, Exchange, LeastPeak, PeakTrack, TrackStatus
 from solver.studies.peaks.tracker import Tracker
-from solver.studies.peaks.work_limit import RESPONSES, Allowance, HaltedError
 
 BESIDE = 5e-3  # share of the range: how far beyond the end of a line is looked
 NARROW = 1.0 / 64.0  # share of the range: sweeps closer than that are not halved further

@@ -10,12 +10,10 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, NamedTuple
 from solver.arrays import Real
 from solver.continuation.branch import unsettled
 from solver.errors import SettingError
-from solver.results.base import Drawn, MadeOfResponses
-from solver.results.known import Known
+from solver.results.base import Data, Drawn, MadeOfResponses, Views
+from solver.results.known import NOTHING_DAMPS, Known
 from solver.results.measures import OF_X, Measured
-from solver.results.notes import NOTHING_DAMPS
 from solver.results.told import Piece
-from solver.results.views import Data, Views
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

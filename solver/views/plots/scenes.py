@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from solver.scene.scene import Scene
-from solver.views.layout import GROUND, NEXT, Pair, Parts, Place, parts_of, places_of
+from solver.views.picture import GROUND, NEXT, Pair, Parts, Place, parts_of, places_of
 from solver.views.plots import style
 from solver.views.plots.style import Into
 

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from solver.results import units
+from solver.results.known import BAND_OPEN, FLAGS, between_points, drift_words, flag_words, note_pairs
 from solver.results.measures import HALF_PEAK_TO_PEAK, MAX_ABS, WORDS, Measured
-from solver.results.notes import BAND_OPEN, FLAGS, between_points, drift_words, flag_words, note_pairs
 from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter
 

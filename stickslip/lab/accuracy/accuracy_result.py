@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn
 from solver.results.told import Piece
-from solver.results.views import Data, Views
+from solver.results.base import Data, Views
 
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch

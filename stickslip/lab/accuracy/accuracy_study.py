@@ -14,7 +14,7 @@ import numpy as np
 
 from solver.balance.balance import Balance, build, check_harmonics
 from solver.balance.kernels.output import MAX_ABS
-from solver.balance.more_harmonics import more_harmonics, pad
+from solver.balance.balance import more_harmonics, pad
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.laws import law_number
 from solver.continuation.branch import Branch

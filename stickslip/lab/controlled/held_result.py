@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.arrays import Real
 from solver.modes.mode_results import OF_CONTACTS, ModalCurve
-from solver.results.views import Data, Views
+from solver.results.base import Data, Views
 
 
 class HeldStatus(Enum):

@@ -25,7 +25,7 @@ from optim.problem.checks import is_number
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn
 from solver.results.told import Piece
-from solver.results.views import Data, Views
+from solver.results.base import Data, Views
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.scene import Scene
 

@@ -12,7 +12,7 @@ import numpy as np
 from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn
 from solver.results.told import Piece
-from solver.results.views import Data, Views
+from solver.results.base import Data, Views
 
 LEVEL = 0.9
 _SCENARIOS = 32

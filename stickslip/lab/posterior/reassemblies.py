@@ -34,7 +34,7 @@ from solver.arrays import FloatOrNaN
 from solver.balance.parameter import resolve
 from solver.jit.timer import clock
 from solver.results.base import Drawn
-from solver.results.views import Data, Views
+from solver.results.base import Data, Views
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.scene import Scene
 

@@ -15,7 +15,7 @@ from solver.jit.timer import clock
 from stickslip.lab.quasi_periodic.quasi_periodic import Question, TorusWatch, check, respond, second_force
 from stickslip.lab.quasi_periodic.quasi_periodic_result import QuasiPeriodic, QuasiPeriodicStatus
 from solver.results.base import Drawn
-from solver.results.views import Data, Views
+from solver.results.base import Data, Views
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.parameter_paths import check_frequency
 from solver.scene.scene import Scene

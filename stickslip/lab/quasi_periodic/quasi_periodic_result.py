@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 
 from solver.arrays import FloatOrNaN, Integer, Real
 from solver.results.base import Drawn
-from solver.results.views import Data, Views
+from solver.results.base import Data, Views
 
 LINES = 40  # of the spectrum that are told
 

@@ -21,7 +21,7 @@ from solver.continuation.parameter_scale import scale_of
 from solver.errors import SettingError, check_count
 from solver.jit.timer import clock
 from solver.results.base import Shown
-from solver.results.views import Data, Views
+from solver.results.base import Data, Views
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 from stickslip.lab.wear_life.life import course_of

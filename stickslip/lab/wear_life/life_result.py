@@ -11,7 +11,7 @@ from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
 from solver.results.measures import OF_X, Measured
-from solver.results.views import Data, Views
+from solver.results.base import Data, Views
 
 
 class WearLifeStatus(Enum):

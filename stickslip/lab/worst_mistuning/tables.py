@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 from solver.results import units
 from solver.results.measures import Measured
-from solver.results.notes import note_pairs
+from solver.results.known import note_pairs
 from solver.results.told import Block, ResultTable, Summary
 
 

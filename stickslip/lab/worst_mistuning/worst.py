@@ -18,7 +18,7 @@ from solver.arrays import Real
 from solver.errors import SettingError
 from solver.jit.timer import clock
 from solver.response.plausibility import band_end_at
-from solver.results.notes import notes_of_all
+from solver.results.known import notes_of_all
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 from solver.studies.blades import blade_rows, mistuned

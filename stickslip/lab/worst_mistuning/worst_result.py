@@ -10,10 +10,10 @@ from typing import Annotated, ClassVar
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn
 from solver.results.measures import OF_X, Measured
-from solver.results.notes import Note
+from solver.results.known import Note
 from solver.results.told import Piece
-from solver.results.views import Data, Views
-from solver.studies.mistuning_result import MistuningStatus
+from solver.results.base import Data, Views
+from solver.studies.study_results import MistuningStatus
 
 
 class WorstMistuningStatus(Enum):

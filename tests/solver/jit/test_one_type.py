@@ -4,8 +4,7 @@ import numba
 import pytest
 
 import solver
-from solver.balance.balance import Balance, build
-from solver.balance.more_harmonics import less_harmonics, linear_part, more_harmonics
+from solver.balance.balance import Balance, build, less_harmonics, linear_part, more_harmonics
 from solver.scene.parameter_paths import parameter_paths
 
 SCENES = ("two-dof", "bladed-disk", "platform-wedge", "platform-cylinder", "shroud-3d")

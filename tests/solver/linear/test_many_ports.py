@@ -10,8 +10,7 @@ from benchmarks.classes import lap_joint
 from benchmarks.problems import chain
 from benchmarks.space import masses, plate
 from solver import Effects, Scene, march, solve
-from solver.balance.balance import build
-from solver.balance.more_harmonics import more_harmonics
+from solver.balance.balance import build, more_harmonics
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import (
     DENSE,

@@ -8,8 +8,7 @@ import pytest
 
 import optim
 import solver
-from solver.balance.balance import build
-from solver.balance.more_harmonics import more_harmonics
+from solver.balance.balance import build, more_harmonics
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import N0
 from solver.errors import SceneError, SettingError

@@ -16,7 +16,7 @@ from service.cli import main
 from solver.balance.balance import build
 from solver.balance.workspace import Workspace
 from solver.linear.assembly import linear_model
-from solver.matrices.faces import face
+from solver.matrices.mortar import face
 from solver.matrices.sectors.decks import Deck
 from solver.matrices.sectors.elimination import rotation
 from solver.sensitivity.gradient import Sensitivities

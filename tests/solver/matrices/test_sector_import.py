@@ -19,10 +19,10 @@ import solver
 from service.cli import main
 from solver import Scene
 from solver.linear.assembly import linear_model
+from solver.matrices import craig_bampton
 from solver.matrices.labels import Label
 from solver.matrices.load_set import MatrixSet, read_set
 from solver.matrices.readers.numbers_in_text import FormatError
-from solver.matrices.reduction import fixed_interface_modes
 from solver.matrices.sectors.decks import Deck, read_deck
 from solver.matrices.sectors.elimination import elimination, rotation
 from solver.matrices.sectors.loading import boundaries
@@ -231,7 +231,7 @@ def test_the_reduction_reports_its_error(monkeypatch: pytest.MonkeyPatch) -> Non
     matrices = {key: csr_array(matrix) for key, matrix in found.matrices.items()}
     every = tuple(range(SECTORS // 2 + 1))
     plain = reduce_sector(matrices, gone, rows_in_use(found, deck), 8, every, SECTORS)
-    monkeypatch.setattr(fixed_interface_modes, "DENSE", 10)
+    monkeypatch.setattr(craig_bampton, "DENSE", 10)
     large = reduce_sector(matrices, gone, rows_in_use(found, deck), 8, every, SECTORS)
     np.testing.assert_allclose(large.quality[1].held_hz, plain.quality[1].held_hz, rtol=1e-10)
     for n, quality in zip(every, plain.quality, strict=True):

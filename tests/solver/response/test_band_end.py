@@ -11,7 +11,7 @@ import optim
 import solver
 from optim.results.design_result import Certainty
 from solver.response.plausibility import BAND_END
-from solver.results.notes import Note
+from solver.results.known import Note
 from solver.scene.scene import Scene
 
 RUNS = 200

@@ -14,7 +14,7 @@ from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import BranchStatus
 from solver.linear.natural_frequencies import undamped_resonance
-from solver.studies.peaks.seeds import fitted
+from solver.studies.peaks.peak_lines import fitted
 from stickslip.lab.quasi_periodic.quasi_periodic_result import QuasiPeriodicStatus
 
 

@@ -13,8 +13,7 @@ from scene_cases import two_dof
 import optim
 import solver
 from solver import Scene, march, solve, sweep
-from solver.balance.balance import build, fewer_harmonics
-from solver.balance.more_harmonics import less_harmonics, more_harmonics, pad
+from solver.balance.balance import build, fewer_harmonics, less_harmonics, more_harmonics, pad
 from solver.scene.scene_harmonics import FAST, MOST_HARMONICS, forced_harmonics, kept_harmonics, spread
 
 DEFECTS = Path(__file__).parent.parent.parent / "data" / "defects"

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 import solver
 from solver.errors import SettingError
 from solver.studies.margin_diagram import most_used
-from solver.studies.margin_result import MarginStatus
+from solver.studies.study_results import MarginStatus
 
 DAMPERS = {"light": {"slides.N0": 0.5}, "heavy": {"slides.N0": 4.0}}
 

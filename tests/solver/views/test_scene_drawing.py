@@ -9,7 +9,7 @@ from matplotlib.patches import Circle
 
 import solver
 from solver import Scene
-from solver.views.layout import layers_of, parts_of
+from solver.views.picture import layers_of, parts_of
 from solver.views.plots.scenes import MOST_PARTS, scene_figure
 
 

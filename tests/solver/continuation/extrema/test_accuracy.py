@@ -8,10 +8,9 @@ from random_scenes import random_scene
 from scene_cases import bladed_disk, loose_mass, mixed_disk, oscillator, two_dof
 
 from solver import Scene, branch_errors, march, solve, sweep
-from solver.balance.balance import build
+from solver.balance.balance import build, more_harmonics, pad
 from solver.balance.kernels.locate import slope_by_parameter
 from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, MEASURES
-from solver.balance.more_harmonics import more_harmonics, pad
 from solver.balance.workspace import Workspace
 from solver.continuation.extrema.error_estimate import ErrorEstimator, truncation_error
 

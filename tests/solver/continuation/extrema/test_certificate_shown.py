@@ -14,7 +14,7 @@ from service.cli import main
 from service.rendering.report.sections import ReportLine, branch_table
 from service.rendering.text import print_told
 from solver.continuation.branch import uncertain
-from solver.results.notes import FLAGS, NONE_HIGHER, flag_words
+from solver.results.known import FLAGS, NONE_HIGHER, flag_words
 from solver.views.tables import responses, tracks
 
 WHY = "a resonance was left at 1.5"

@@ -7,8 +7,7 @@ import pytest
 
 import solver
 from solver.balance.balance import build
-from solver.balance.known_springs import MOST_ENTRIES
-from solver.balance.workspace import Workspace
+from solver.balance.workspace import MOST_ENTRIES, Workspace
 from solver.continuation.branches.sweep import walk_branch
 from solver.continuation.extrema.nodes import NodeSolver
 from solver.continuation.stretches import joined

@@ -99,7 +99,7 @@ def test_stopped_before_the_look_the_optimum_is_proven_all_the_same(monkeypatch:
         swept.append(solver.sweep(*args, **more))
         return swept[-1]
 
-    monkeypatch.setattr("solver.studies.peaks.track.sweep", sweep)
+    monkeypatch.setattr("solver.studies.peaks.survey.sweep", sweep)
     best = least_peak(scene_of(name), path, low, high, basins=2, should_stop=lambda: len(swept) >= 2)
     assert best.status is TrackStatus.TRACKED
     assert best.sweeps == 2

@@ -13,9 +13,8 @@ from scene_cases import oscillator
 import solver
 from solver.errors import SettingError
 from solver.studies.peaks.minimise_peak import least_peak
-from solver.studies.peaks.track import sweep_within
+from solver.studies.peaks.survey import Allowance, sweep_within
 from solver.studies.peaks.track_results import LeastPeak, TrackStatus
-from solver.studies.peaks.work_limit import Allowance
 
 DESIGNS = [
     ("two-dof", "damper.N0", 10.0, 500.0),
@@ -281,7 +280,7 @@ def test_a_response_that_takes_far_longer_is_given_up_with_all_its_work(
     assert whole.reached
     assert [peak.value for peak in whole.peaks] == [peak.value for peak in solver.sweep(scene).peaks]
     allowance.measure([1])
-    monkeypatch.setattr("solver.studies.peaks.work_limit.LONGEST", 0.1)
+    monkeypatch.setattr("solver.studies.peaks.survey.LONGEST", 0.1)
     short = sweep_within(scene, 11, None, allowance)
     assert not short.reached
     assert not short.peaks

@@ -11,7 +11,7 @@ from one_variable_scenes import OneVariable, one_variable
 
 import solver
 from solver.scene.scene import Scene
-from solver.studies.peaks import work_limit as allowance
+from solver.studies.peaks import survey
 from solver.studies.peaks.minimise_peak import least_peak
 from solver.studies.peaks.track_peak import track_peak
 from solver.studies.peaks.track_results import ChosenBy, LeastPeak, TrackStatus
@@ -251,7 +251,7 @@ def test_a_track_whose_work_is_used_up_says_so(monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.parametrize("ask", [least_peak, track_peak])
 def test_stop_is_heard_within_a_second(after: float, ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of processor time, so that a busy machine does not count."""
-    monkeypatch.setattr(allowance, "clock", time.process_time)
+    monkeypatch.setattr(survey, "clock", time.process_time)
     scene = three_contacts()
     for _ in range(2):  # kernels are loaded in the first run of a process
         begun = time.process_time()

@@ -1,1 +1,0 @@
-"""Large models reduced onto the DOFs in use."""
