@@ -27,8 +27,7 @@ from optim.identification.unknowns import Unknowns, read_unknowns
 from optim.problem.checks import DataError, DesignError, is_number, whole
 from optim.problem.uncertainty_input import CONFIDENCE, read_uncertain
 from optim.problem.variables import Real
-from solver.balance.balance import check_harmonics
-from solver.balance.parameter import resolve
+from solver.balance.balance import check_harmonics, resolve
 from solver.errors import SceneError, SettingError
 from solver.jit.timer import clock
 from solver.results.watch import OnProgress, ShouldStop, shows_progress

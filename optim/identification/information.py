@@ -25,7 +25,7 @@ from optim.identification.fit import HUBER, LocalFit, Runs
 from optim.identification.unknowns import Unknowns
 from optim.problem.checks import DesignError, is_number
 from optim.problem.variables import Real
-from solver.balance.parameter import Kind, resolve
+from solver.balance.balance import Kind, resolve
 from solver.contacts.kernels.stick_slip_events import SEPARATED, STUCK
 from solver.contacts.laws.friction import FrictionContact
 from solver.errors import at

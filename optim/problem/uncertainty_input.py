@@ -13,7 +13,7 @@ from optim.problem.cases import LoadCase, displaced
 from optim.problem.checks import DesignError, is_number, share
 from optim.problem.uncertainty_set import Coordinate, Disk, How, Scenario, UncertainSet, UncertaintyShape
 from optim.problem.variables import BoundedVariable, Real
-from solver.balance.parameter import Kind, resolve
+from solver.balance.balance import Kind, resolve
 from solver.errors import Place, at
 from solver.scene.scene import Scene
 from solver.scene.structure_parameters import STRUCTURE

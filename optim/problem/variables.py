@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from optim.problem.checks import DesignError, Scaling, number_pair, word
 from optim.problem.problem_keys import ABOVE, BELOW, default_variable
-from solver.balance.parameter import Kind, resolve
+from solver.balance.balance import Kind, resolve
 from solver.errors import at
 from solver.scene.parameter_paths import AMPLITUDE
 from solver.scene.scene import Scene

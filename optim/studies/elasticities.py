@@ -23,7 +23,7 @@ from optim.results.studies_result import (
     SensitivityStatus,
     WithoutDerivative,
 )
-from solver.balance.parameter import resolve
+from solver.balance.balance import resolve
 from solver.balance.parameter_derivatives import reason_without
 from solver.balance.simplifications import Effects
 from solver.contacts.laws.load_harmonics import is_phase

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from solver.balance.parameter import Kind
+from solver.balance.balance import Kind
 from solver.contacts.kernels.system import DENSE, MODES, POLES, System
 from solver.jit.fourier import Complex, Flags, Integer, Real
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.balance.balance import Parameter
 from solver.balance.kernels.residual import contact_values
-from solver.balance.parameter import Parameter
 from solver.contacts.kernels.laws import law_force, law_second, second_number
 from solver.contacts.kernels.stick_slip_events import FAILED, new_segments
 from solver.contacts.kernels.system import System

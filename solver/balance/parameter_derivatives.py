@@ -8,9 +8,8 @@ from typing import Annotated, cast
 
 import numpy as np
 
-from solver.balance.balance import Balance, check_level
+from solver.balance.balance import Balance, Kind, Parameter, check_level, resolve
 from solver.balance.kernels.residual import contact_values
-from solver.balance.parameter import Kind, Parameter, resolve
 from solver.contacts.kernels.laws import law_force
 from solver.contacts.kernels.system import MODES, Evaluation
 from solver.contacts.laws.load_harmonics import is_of_variation, load_slopes

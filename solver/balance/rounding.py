@@ -19,9 +19,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from solver.balance.balance import Balance
+from solver.balance.balance import Balance, Kind
 from solver.balance.kernels.linearised_contacts import fill_springs
-from solver.balance.parameter import Kind
 from solver.contacts.kernels.system import (
     DENSE,
     MODES,

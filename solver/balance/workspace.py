@@ -10,7 +10,7 @@ from typing import Annotated
 
 import numpy as np
 
-from solver.balance.balance import Balance, fewer_harmonics
+from solver.balance.balance import Balance, Kind, fewer_harmonics
 from solver.balance.closed_loop_poles import ClosedLoop
 from solver.balance.kernels.jacobian import fill_jacobian, whole_jacobian
 from solver.balance.kernels.locate import slope_by_parameter
@@ -19,7 +19,6 @@ from solver.balance.kernels.newton import from_stuck, ladder, newton, stuck_star
 from solver.balance.kernels.output import MEASURES
 from solver.balance.kernels.residual import evaluate
 from solver.balance.mean_loads import friction_can_hold, may_stick
-from solver.balance.parameter import Kind
 from solver.contacts.kernels.columns import KT, KT_SECOND
 from solver.contacts.kernels.stick_slip_events import FAILED, STUCK
 from solver.contacts.kernels.system import (

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from solver.balance.balance import Balance
-    from solver.balance.parameter import Parameter
+    from solver.balance.balance import Balance, Parameter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

@@ -16,8 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.balance.balance import Balance, build, level_scales_all
-from solver.balance.parameter import Kind
+from solver.balance.balance import Balance, Kind, build, level_scales_all
 from solver.balance.workspace import PointSolution, Workspace
 from solver.continuation.branch import BranchStatus
 from solver.jit.fourier import Real

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import numpy as np
 
-from solver.balance.parameter import Kind, Parameter, resolve
+from solver.balance.balance import Kind, Parameter, resolve
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.scene.scene import Scene

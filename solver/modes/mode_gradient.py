@@ -25,6 +25,7 @@ from typing import Annotated, cast
 
 import numpy as np
 
+from solver.balance.balance import Kind
 from solver.balance.contact_hessian import (
     check_laws,
     check_loads,
@@ -32,7 +33,6 @@ from solver.balance.contact_hessian import (
     contact_forces,
     second_numbers,
 )
-from solver.balance.parameter import Kind
 from solver.balance.parameter_derivatives import (
     HarmonicMatrices,
     check_smooth_structure,

@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from solver.balance.balance import Balance, build
+from solver.balance.balance import Balance, Kind, build
 from solver.balance.kernels.residual import contact_values
-from solver.balance.parameter import Kind
 from solver.balance.workspace import ALONG, PointSolution, Workspace
 from solver.contacts.kernels.columns import PRESTRESSED
 from solver.contacts.kernels.system import UNHELD

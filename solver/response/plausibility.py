@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.balance.parameter import Kind
+from solver.balance.balance import Kind
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
 from solver.linear.condensation import SINGULAR

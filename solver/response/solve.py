@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.balance.balance import Balance, build, check_harmonics
+from solver.balance.balance import Balance, Kind, build, check_harmonics
 from solver.balance.kernels.gauge import FREE
 from solver.balance.kernels.output import HALF_RANGE, MEAN, extremes
-from solver.balance.parameter import Kind
 from solver.balance.rounding import resonates_undamped
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import PointSolution, Workspace

@@ -26,10 +26,9 @@ from typing import Annotated, NamedTuple, cast
 
 import numpy as np
 
-from solver.balance.balance import Balance, build, contact_index, for_parameter
+from solver.balance.balance import Balance, Kind, build, contact_index, for_parameter
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.residual import contact_values, evaluate
-from solver.balance.parameter import Kind
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import KT, MU, OMEGA

@@ -21,10 +21,9 @@ from typing import Annotated
 
 import numpy as np
 
-from solver.balance.balance import Balance
+from solver.balance.balance import Balance, Kind
 from solver.balance.kernels.haigh import STATIC, utilisation
 from solver.balance.kernels.output import extremes
-from solver.balance.parameter import Kind
 from solver.balance.workspace import PointSolution, Workspace
 from solver.contacts.kernels.columns import MU
 from solver.continuation.bracketing import least_between

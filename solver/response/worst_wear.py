@@ -24,11 +24,10 @@ from typing import Annotated, TypeVar
 
 import numpy as np
 
-from solver.balance.balance import contact_index
+from solver.balance.balance import Kind, contact_index
 from solver.balance.kernels.locate import between
 from solver.balance.kernels.output import MEASURES
 from solver.balance.kernels.residual import contact_values, evaluate
-from solver.balance.parameter import Kind
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import evaluation_by_value
 from solver.continuation.bracketing import closing_in, dense_between

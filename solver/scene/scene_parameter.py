@@ -33,7 +33,7 @@ Forces = tuple[tuple[str, float], ...]  # constant forces [N] by DOFs
 
 
 class ActsOn(Enum):
-    """What of a scene a parameter changes; of the names of `solver.balance.parameter.Kind`."""
+    """What of a scene a parameter changes; of the names of `solver.balance.balance.Kind`."""
 
     LEVEL = "the amplitude of the excitation"
     FORCE_PHASE = "its phase"

@@ -25,7 +25,7 @@ from typing import Annotated
 
 import numpy as np
 
-from solver.balance.balance import Balance
+from solver.balance.balance import Balance, Kind
 from solver.balance.contact_hessian import (
     ContactForces,
     check_laws,
@@ -37,7 +37,6 @@ from solver.balance.contact_hessian import (
 )
 from solver.balance.kernels.haigh import utilisation
 from solver.balance.kernels.jacobian import factorise, step_back, step_back_transposed
-from solver.balance.parameter import Kind
 from solver.balance.parameter_derivatives import (
     check_smooth_structure,
     contact_slopes,

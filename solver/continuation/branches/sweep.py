@@ -17,9 +17,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.balance.balance import Balance, build
+from solver.balance.balance import Balance, Kind, build
 from solver.balance.kernels.output import MAX_ABS
-from solver.balance.parameter import Kind
 from solver.balance.rounding import resonates_undamped
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace

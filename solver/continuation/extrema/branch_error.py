@@ -32,12 +32,11 @@ from typing import Annotated
 
 import numpy as np
 
-from solver.balance.balance import Balance, more_harmonics, pad
+from solver.balance.balance import Balance, Kind, more_harmonics, pad
 from solver.balance.closed_loop_poles import MOST_MODES, coupled
 from solver.balance.kernels.linearised_contacts import forces_at
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.kernels.residual import evaluate
-from solver.balance.parameter import Kind
 from solver.balance.rounding import observed_rounding
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import DENSE, MODES, System

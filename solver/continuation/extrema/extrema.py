@@ -26,10 +26,10 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.balance.balance import Kind
 from solver.balance.closed_loop_poles import ClosedLoop
 from solver.balance.kernels.locate import EDGE, HIGH_PEAK, LOW_PEAK
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS, PIECE, RESIDUAL
-from solver.balance.parameter import Kind
 from solver.continuation.bracketing import dense_between, fold_between
 from solver.continuation.branch import Band, Branch, Edge, Peak, PeakCertificate, Points, certified, uncertain
 from solver.continuation.extrema.kernels.interval_kernels import IS_BENT, WAVES, WORTH_POLISHING

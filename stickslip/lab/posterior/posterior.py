@@ -21,7 +21,7 @@ from stickslip.lab.posterior.target import Target
 from optim.identification.reading import Given, read_data
 from optim.identification.unknowns import read_unknowns
 from optim.problem.variables import Real
-from solver.balance.parameter import resolve
+from solver.balance.balance import resolve
 from solver.jit.timer import clock
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene

@@ -31,7 +31,7 @@ from optim.identification.reading import Given
 from optim.identification.unknowns import Unknowns, read_unknowns
 from optim.problem.variables import Real
 from solver.arrays import FloatOrNaN
-from solver.balance.parameter import resolve
+from solver.balance.balance import resolve
 from solver.jit.timer import clock
 from solver.results.base import Drawn
 from solver.results.base import Data, Views

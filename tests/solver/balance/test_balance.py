@@ -19,9 +19,8 @@ from scene_cases import (
     two_dof,
 )
 
-from solver.balance.balance import build, for_parameter
+from solver.balance.balance import Kind, build, for_parameter, resolve
 from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, RANGE_SLOPE, SLOPE
-from solver.balance.parameter import Kind, resolve
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import DENSE, MODES, POLES
 from solver.errors import SettingError

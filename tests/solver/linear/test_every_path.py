@@ -12,8 +12,7 @@ from random_scenes import random_scene
 from random_space import random_space
 from scene_cases import bladed_disk, two_dof
 
-from solver.balance.balance import contact_rows
-from solver.balance.parameter import Kind, Parameter, resolve
+from solver.balance.balance import Kind, Parameter, contact_rows, resolve
 from solver.contacts.laws.load_harmonics import load_slopes
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.condensation import force_amplitudes, term_amplitudes

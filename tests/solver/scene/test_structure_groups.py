@@ -9,7 +9,7 @@ from mistuned_cases import VALUES, disk, with_mistuning
 from scene_cases import two_dof
 
 from solver import Scene, SceneError, SettingError, annulus, load_scene, mistuned, solve, sweep
-from solver.balance.parameter import resolve
+from solver.balance.balance import resolve
 from solver.linear.assembly import linear_model, structure_derivative
 
 

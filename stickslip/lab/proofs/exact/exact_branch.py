@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 
 from solver.balance.balance import check_harmonics
-from solver.balance.parameter import Kind, Parameter, check_fixed, resolve
+from solver.balance.balance import Kind, Parameter, check_fixed, resolve
 from solver.continuation.branch import AnyBranch
 from solver.continuation.branch import Bifurcations, Mark, MarkKind
 from solver.continuation.branch import Peak

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, MEAN, MEASURES, RESIDUAL
-from solver.balance.parameter import Kind
+from solver.balance.balance import Kind
 from solver.continuation.bracketing import closing_in, least_between
 from solver.continuation.branch import BranchStatus
 from solver.continuation.branches.sweep import check_limit

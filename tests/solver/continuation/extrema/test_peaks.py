@@ -10,9 +10,8 @@ from scene_cases import bladed_disk, oscillator, two_dof
 from scipy.optimize import minimize_scalar
 
 from solver import Scene, solve, sweep
-from solver.balance.balance import build
+from solver.balance.balance import Kind, build
 from solver.balance.kernels.output import MAX_ABS, SLOPE
-from solver.balance.parameter import Kind
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Branch, Peak
 from solver.continuation.extrema.extrema import HALF_POWER, band_limit
