@@ -234,7 +234,7 @@ COMMANDS = {
             "Draw the stress over the excitation for several dampers, and the excitation each allows.",
         ),
         CommandEntry(
-            "identify", "commands.identify_command.identify",
+            "identify", "commands.design_commands.identify",
             "Find parameters from measured responses and hysteresis loops.",
         ),
         CommandEntry(
@@ -272,7 +272,7 @@ COMMANDS = {
             "Print the JSON Schema of scene files, design problems or jobs, for editors.",
         ),
         CommandEntry(
-            "report", "commands.report.report",
+            "report", "commands.client.job_commands.report",
             "Write the report of a design or an identification that the service computed.", keyed=True,
         ),
         CommandEntry(

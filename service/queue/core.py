@@ -16,11 +16,11 @@ from typing import Any
 
 from service.auth.allowances import Storage, highest_priority, share
 from service.auth.callers import KEYLESS, Caller
-from service.db import pg_notify, revisions
+from service.db import revisions
 from service.db.clock import Clock
 from service.db.engine import Database
 from service.db.models import JobState
-from service.db.pg_notify import Notices
+from service.db.postgresql import ACCEPTED, CANCEL, ENDED, LIVE, WATCH, Notices
 from service.db.repositories import (
     JobRepository,
     JobRow,
@@ -133,15 +133,15 @@ class Service:
         made = Notices(
             self.database.own_connection, self.queue.wake,
             {
-                pg_notify.ENDED: self.waiters.ended_elsewhere, pg_notify.CANCEL: self.queue.cancel_running,
-                pg_notify.WATCH: lambda text: elsewhere.watched(text),
-                pg_notify.LIVE: lambda text: elsewhere.told(text),
+                ENDED: self.waiters.ended_elsewhere, CANCEL: self.queue.cancel_running,
+                WATCH: lambda text: elsewhere.watched(text),
+                LIVE: lambda text: elsewhere.told(text),
             },
         )  # fmt: skip
-        ask, tell = partial(made.tell, pg_notify.WATCH), partial(made.tell, pg_notify.LIVE)
+        ask, tell = partial(made.tell, WATCH), partial(made.tell, LIVE)
         elsewhere = Elsewhere(self.waiters, self.queue.live, ask, tell)
         self._elsewhere = elsewhere
-        self.waiters.relay = partial(made.tell, pg_notify.ENDED)
+        self.waiters.relay = partial(made.tell, ENDED)
         return made
 
     def open(self) -> None:
@@ -264,7 +264,7 @@ class Service:
         if row.state is JobState.ACCEPTED:
             self.queue.wake()
             if self._notices is not None:
-                self._notices.tell(pg_notify.ACCEPTED)
+                self._notices.tell(ACCEPTED)
         return row, inserted
 
     def _seconds_limit(self, request: JobRequest, caller: Caller) -> float | None:
@@ -307,7 +307,7 @@ class Service:
         if row.state is JobState.RUNNING:
             self.queue.cancel_running(job_id)
             if self._notices is not None:
-                self._notices.tell(pg_notify.CANCEL, job_id)
+                self._notices.tell(CANCEL, job_id)
         else:
             self.waiters.ended(job_id)
         return row

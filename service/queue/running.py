@@ -2,7 +2,7 @@
 
 Of jobs that another service of the same PostgreSQL database runs, those hear who watch them here: who watches
 says so to all services now and then, with how many points of the branch are known; the one that runs the job
-then tells what else it has, and what is new as it comes, in notices (`service.db.pg_notify`). Of what nobody
+then tells what else it has, and what is new as it comes, in notices (`service.db.postgresql`). Of what nobody
 watches at another service nothing is told.
 """
 

@@ -29,10 +29,9 @@ from service.http.dependencies import (
 )
 from service.http.in_lane import prepared, reading
 from service.http.made_once import LargeAnswers
-from service.jobs.kind_registry import JobRequest, Registry
+from service.jobs.kind_registry import KIND, JobRequest, Registry
 from service.jobs.kinds.bodies import (
     DESIGN,
-    KIND,
     any_body,
     design_body,
     examples,

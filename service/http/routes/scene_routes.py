@@ -18,7 +18,8 @@ from service.jobs import answering
 from service.jobs.answering import PLAN, PREVIEW, STORE
 from service.jobs.common.scene_parameters import SceneParameterList
 from service.jobs.common.scene_requests import SceneRequest
-from service.jobs.kinds.bodies import KIND, any_body, examples
+from service.jobs.kind_registry import KIND
+from service.jobs.kinds.bodies import any_body, examples
 from service.jobs.kinds.previews import PREVIEWS, PreviewRequest
 from service.jobs.studies.plan_study import EXAMPLE, Plan, plan_result
 from service.queue.scene_store import shipped

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from service.cli.commands.identify_command import Columns, Data, Uncertain, computed, write_problem
+from service.cli.commands.design_commands import Columns, Data, Uncertain, computed, write_problem
 from service.cli.options import inputs
 from service.cli.study_command import Keys, Outputs, give
 from stickslip.lab.posterior.study import PosteriorStudy
