@@ -163,10 +163,7 @@ class Storage:
     def require(self, caller: Caller, more: int = 0) -> None:
         """Count `more` bytes that are about to be stored.
 
-        Raises
-        ------
-        StorageFullError
-            If that is more than the caller's owner may store.
+        StorageFullError if that is more than the caller's owner may store.
         """
         most = share(caller, self._settings, "storage_bytes")
         if most is None:

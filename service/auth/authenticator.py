@@ -56,10 +56,7 @@ def create(
 ) -> Made[ApiKey]:
     """Make a key.
 
-    Raises
-    ------
-    InvalidRequestError
-        For an owner that is no name, no scope at all, or an expiry in the past.
+    InvalidRequestError for an owner that is no name, no scope at all, or an expiry in the past.
     """
     issues = []
     if _OWNER.fullmatch(owner) is None:
@@ -198,11 +195,7 @@ class Authenticator:
         """Count a request: for its key, for its link, and without either for the address it came from.
 
         Where no keys are needed everybody is one owner, and nobody would pay for another.
-
-        Raises
-        ------
-        TooManyRequestsError
-            There were as many as may be made.
+        TooManyRequestsError if there were as many as may be made.
         """
         if caller is KEYLESS:
             return
@@ -215,10 +208,7 @@ class Authenticator:
     def count_login(self, address: str) -> None:
         """Count a log-in, of which an address has as many a minute as keys that do not work.
 
-        Raises
-        ------
-        TooManyRequestsError
-            There were as many as may be made.
+        TooManyRequestsError if there were as many as may be made.
         """
         most = self._settings.failed_keys_per_minute
         wait = self._failures.take(f"log-in from {_neighbourhood(address)}", most)

@@ -67,10 +67,7 @@ def first_told() -> int:
 def told_without_compiler(case: DemoCase) -> int:
     """Have another process design a damper and say what came out, kernels interpreted; how many were told.
 
-    Raises
-    ------
-    ShortfallError
-        It did not reach its goal.
+    ShortfallError if it did not reach its goal.
     """
     low, high = (f"{bound:g}" for bound in case.bounds)
     asked = ("design", case.scene, "--variable", case.variable, low, high)

@@ -43,10 +43,7 @@ class Outputs:
     def asked(cls, plot: str | None, out: str | None) -> Self:
         """Check both options before the work begins.
 
-        Raises
-        ------
-        InputError
-            A suffix that has no writer, or a folder that is not there.
+        InputError for a suffix that has no writer, or a folder that is not there.
         """
         if plot is None and out is None:
             return cls(picture=None, file=None)

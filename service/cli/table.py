@@ -193,12 +193,7 @@ PROJECTS = (
     CommandEntry("list", f"{_RUNS}.show_projects", "List the projects, newest first.", keyed=True),
     CommandEntry("create", f"{_RUNS}.create_project", "Make a project and print its id.", keyed=True),
     CommandEntry("change", f"{_RUNS}.change_project", "Change name or notes of a project.", keyed=True),
-    CommandEntry(
-        "delete",
-        f"{_RUNS}.delete_project",
-        "Put a project in the bin; its runs stay.",
-        keyed=True,
-    ),
+    CommandEntry("delete", f"{_RUNS}.delete_project", "Put a project in the bin; its runs stay.", keyed=True),
     CommandEntry("restore", f"{_RUNS}.restore_project", "Take a project out of the bin.", keyed=True),
 )
 

@@ -61,10 +61,7 @@ class EmbeddedService:
     def submit(self, kind: str, spec: Mapping[str, Any], *, idempotency_key: str | None = None) -> str:
         """Accept a job and give back its id; `spec` has the words of the REST body without ``kind``.
 
-        Raises
-        ------
-        InvalidRequestError
-            Lists everything that is wrong, with pointers into `spec`.
+        InvalidRequestError with everything that is wrong, with pointers into `spec`.
         """
         row, _ = self._service.submit({**spec, "kind": kind}, idempotency_key)
         return row.id

@@ -56,10 +56,7 @@ class ArrayStore(Protocol):
 def array_store(place: str | None) -> ArrayStore | None:
     """Return the store at a folder or a URL of fsspec; None for none.
 
-    Raises
-    ------
-    ConfigurationError
-        It cannot be used.
+    ConfigurationError if it cannot be used.
     """
     made: ArrayStore | None = None if place is None else from_lab("stores.array_store:FsspecStore")(place)
     return made
@@ -204,10 +201,7 @@ def migration_engine(url: str) -> Engine:
 def migrating(url: str) -> Iterator[Connection]:
     """A transaction for changes of the tables; no other one of this kind runs beside it.
 
-    Raises
-    ------
-    DatabaseError
-        If the database cannot be used.
+    DatabaseError if the database cannot be used.
     """
     if is_sqlite(url):
         make_private(database_path(url))
@@ -371,10 +365,7 @@ class Database:
 def backup(url: str, target: Path) -> None:
     """Copy a database to a new file, and its uploads to the folder beside that, while it may be in use.
 
-    Raises
-    ------
-    DatabaseError
-        If `target` exists, the source does not, or it is not SQLite.
+    DatabaseError if `target` exists, the source does not, or it is not SQLite.
     """
     if not is_sqlite(url):
         raise DatabaseError(f"{database_name(url)} is backed up with PostgreSQL's own pg_dump")

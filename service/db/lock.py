@@ -49,10 +49,7 @@ _OURS_ALONE = 0o600
 def make_private(path: Path) -> None:
     """Make a file that its owner alone can read, if there is none; SQLite's other files take after it.
 
-    Raises
-    ------
-    DatabaseError
-        If it cannot be made.
+    DatabaseError if it cannot be made.
     """
     if path.exists():
         return  # opened and closed, it would lose SQLite's locks if this process had it open

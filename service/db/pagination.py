@@ -177,13 +177,7 @@ _MOST = 2**62  # of whole numbers, which databases hold
 
 
 def decode(cursor: str) -> Position:
-    """The position of a cursor.
-
-    Raises
-    ------
-    InvalidRequestError
-        If this service did not make it.
-    """
+    """The position of a cursor (InvalidRequestError if this service did not make it)."""
     try:
         padded = cursor + "=" * (-len(cursor) % 4)
         value, row_id = json.loads(base64.urlsafe_b64decode(padded.encode("ascii")))

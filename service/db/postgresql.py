@@ -222,10 +222,7 @@ def migration_engine(url: str) -> Engine:
 def lock_tables(connection: Connection) -> None:
     """Be the only one, until the transaction ends, who makes or changes tables.
 
-    Raises
-    ------
-    DatabaseError
-        If the server is too old.
+    DatabaseError if the server is too old.
     """
     found = connection.dialect.server_version_info
     if found is None or found < (OLDEST,):
@@ -245,13 +242,7 @@ def lock_quantities(connection: Connection) -> None:
 
 
 def refuse_running(connection: Connection, name: str) -> None:
-    """Keep services out until the transaction ends.
-
-    Raises
-    ------
-    DatabaseInUseError
-        If one is running.
-    """
+    """Keep services out until the transaction ends (DatabaseInUseError if one is running)."""
     if not connection.execute(text(f"SELECT pg_try_advisory_xact_lock({_SERVICES})")).scalar_one():
         raise DatabaseInUseError(f"{name} is in use by running stickslip services: stop them first")
 

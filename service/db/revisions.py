@@ -49,10 +49,7 @@ def _current(connection: Connection) -> tuple[str | None, bool]:
 def current_revision(url: str) -> str:
     """The revision of an existing database; ``none`` if it has never had one.
 
-    Raises
-    ------
-    DamagedDatabaseError
-        If it cannot be used.
+    DamagedDatabaseError if it cannot be used.
     """
     engine = read_engine(url)
     try:

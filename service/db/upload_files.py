@@ -56,10 +56,7 @@ class UploadFiles:
     def work(self) -> Iterator[Path]:
         """A folder for files that come in or are read, which goes at the end.
 
-        Raises
-        ------
-        DatabaseAwayError
-            If there is no room for them.
+        DatabaseAwayError if there is no room for them.
         """
         try:
             if self._folder is not None:

@@ -286,10 +286,7 @@ def preferred_wait(headers: Mapping[str, str], longest: float) -> float | None:
 def idempotency_key(headers: Mapping[str, str]) -> str | None:
     """The Idempotency-Key of a request, or None.
 
-    Raises
-    ------
-    InvalidRequestError
-        If it is empty, longer than 200 characters or not printable ASCII.
+    InvalidRequestError if it is empty, longer than 200 characters or not printable ASCII.
     """
     key = headers.get("idempotency-key")
     if key is None or _KEY.fullmatch(key):

@@ -177,12 +177,7 @@ class Reports:
         self._owners: Counter[str] = Counter()
 
     async def get(
-        self,
-        key: str,
-        owner: str,
-        make: Callable[[], bytes],
-        seconds: float | None,
-        made: Callable[[], None],
+        self, key: str, owner: str, make: Callable[[], bytes], seconds: float | None, made: Callable[[], None]
     ) -> bytes | None:
         """Return a report; None if it is not there after so long.
 

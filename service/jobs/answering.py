@@ -14,12 +14,7 @@ from typing import Annotated, Any
 from service.errors import BodyTooLargeError, InvalidRequestError, MalformedBodyError, issues_to_json
 from service.jobs.common.measurements import look_at, read_measurements
 from service.jobs.common.scene_parameters import scene_parameters
-from service.jobs.common.scene_requests import (
-    read_scene,
-    refers_to_uploads,
-    require,
-    resolve_scene,
-)
+from service.jobs.common.scene_requests import read_scene, refers_to_uploads, require, resolve_scene
 from service.jobs.common.scene_text import issues_of_scene, read_text, side_by_side
 from service.jobs.common.sizes import memory_limited, work_limited
 from service.jobs.kind_registry import KIND, JobRequest, Registry, Resolve, RunOn, SceneSource, request_in

@@ -52,10 +52,8 @@ def packed(part: int, arrays: Arrays, request: str) -> ResultPiece:
 def unpacked(piece: ResultPiece, request: str) -> Arrays:
     """The arrays of a piece.
 
-    Raises
-    ------
-    UnusableError
-        If its bytes are not those that were packed, another version packed them, or for another request.
+    UnusableError if its bytes are not those that were packed, another version packed them, or for another
+    request.
     """
     import numpy as np
 

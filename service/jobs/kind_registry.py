@@ -322,10 +322,7 @@ class Registry:
     def parse(self, body: Mapping[str, Any]) -> tuple[JobKind, JobRequest]:
         """The kind that a body names, and what it asks of it.
 
-        Raises
-        ------
-        InvalidRequestError
-            Lists everything that is wrong.
+        InvalidRequestError with everything that is wrong.
         """
         if KIND not in body:
             raise InvalidRequestError.of((KIND,), "is missing")

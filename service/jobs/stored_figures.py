@@ -234,13 +234,7 @@ class StoredArray:
         return cls.of_bytes(buffer.getvalue())
 
     def array(self) -> NDArray[Any]:
-        """Return the array.
-
-        Raises
-        ------
-        DatabaseError
-            The bytes are not those that were stored.
-        """
+        """Return the array (DatabaseError if the bytes are not those that were stored)."""
         import numpy as np
 
         if hashlib.sha256(self.data).hexdigest() != self.sha256:

@@ -264,10 +264,7 @@ _MESSAGES = {
 def validated(model: type[ModelT], body: object, source: str = "body") -> ModelT:
     """`body` as a checked `model`; `source` says what it is.
 
-    Raises
-    ------
-    InvalidRequestError
-        Lists everything that is wrong.
+    InvalidRequestError with everything that is wrong.
     """
     if not isinstance(body, Mapping):
         raise InvalidRequestError.of(

@@ -295,10 +295,7 @@ class Service:
     def dismiss(self, job_id: str, caller: Caller = KEYLESS) -> JobRow:
         """Cancel a job. A running one ends within the grace; the row given back may say `running` still.
 
-        Raises
-        ------
-        ConflictError
-            If it ended before.
+        ConflictError if it ended before.
         """
         self.job(job_id, caller)
         row = visible(self.jobs.cancel(job_id), caller.sees, f"there is no job {job_id!r}")
@@ -315,10 +312,7 @@ class Service:
     def scene_of(self, job_id: str, caller: Caller = KEYLESS) -> dict[str, Any]:
         """The scene of a job as it is computed: with its values set, and what its uploads held.
 
-        Raises
-        ------
-        NotFoundError
-            If it has no scene.
+        NotFoundError if it has no scene.
         """
         scene: dict[str, Any] | None = self.jobs.spec(self.job(job_id, caller).id).get("scene")
         if scene is None:

@@ -59,12 +59,7 @@ class JobQueue:
     """
 
     def __init__(
-        self,
-        jobs: JobRepository,
-        executor: Executor,
-        settings: Settings,
-        waiters: Waiters,
-        meters: Meters,
+        self, jobs: JobRepository, executor: Executor, settings: Settings, waiters: Waiters, meters: Meters
     ) -> None:
         self._meters = meters
         self.owner = f"{socket.gethostname()}:{os.getpid()}:{secrets.token_hex(4)}"

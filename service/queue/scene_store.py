@@ -45,10 +45,7 @@ class SceneStore:
     def get(self, name: str) -> StoredScene:
         """The shipped scene of this name, or the caller's own; only names are looked up, never paths.
 
-        Raises
-        ------
-        NotFoundError
-            If there is none.
+        NotFoundError if there is none.
         """
         if name in shipped_scenes():
             return _shipped(name)

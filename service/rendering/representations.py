@@ -101,10 +101,7 @@ def parquet_available() -> bool:
 def chosen(accept: str | None, media: Sequence[str]) -> str:
     """The media type to answer with.
 
-    Raises
-    ------
-    NotAcceptableError
-        If the client takes none of them, listing those there are.
+    NotAcceptableError if the client takes none of them, listing those there are.
     """
     there = [one for one in media if one != PARQUET or parquet_available()]
     found = preferred(accept, there)

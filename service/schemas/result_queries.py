@@ -172,10 +172,7 @@ def _record(of: str) -> type[StoredRecord]:
 def quantities(of: str, registry: Registry) -> dict[str, Quantity]:
     """The figures of the results of a kind, by name; those of its parts are not among them.
 
-    Raises
-    ------
-    InvalidRequestError
-        If there is no such kind.
+    InvalidRequestError if there is no such kind.
     """
     if of in RECORDS:
         return quantities_of_record(RECORDS[of])

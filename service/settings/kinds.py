@@ -73,10 +73,7 @@ def _kinds_of(entry: str) -> list[JobKind]:
 def registry_here() -> Registry:
     """The kinds that the settings of the environment name beside those that come with the service.
 
-    Raises
-    ------
-    ConfigurationError
-        As `service.settings.kinds.registry_of`, or a setting is wrong.
+    ConfigurationError as `service.settings.kinds.registry_of`, or a setting is wrong.
     """
     if "STICKSLIP_KINDS" not in os.environ:
         return SHIPPED

@@ -260,10 +260,7 @@ class Settings(ClientLimits):
         description="How long a running job stays its owner's without a sign of life [s].",
     )
     grace_seconds: float = Field(
-        default=0.5,
-        ge=0.0,
-        le=60.0,
-        description="Time between asking a worker to stop and killing it [s].",
+        default=0.5, ge=0.0, le=60.0, description="Time between asking a worker to stop and killing it [s]."
     )
     poll_seconds: float = Field(
         default=5.0,
@@ -496,10 +493,7 @@ class Settings(ClientLimits):
 def load_settings(**values: object) -> Settings:
     """Settings from `values`, then the environment, then the defaults.
 
-    Raises
-    ------
-    ConfigurationError
-        Naming each bad setting, its value and what would be right.
+    ConfigurationError naming each bad setting, its value and what would be right.
     """
     try:
         return Settings(**values)  # type: ignore[arg-type]

@@ -30,10 +30,7 @@ class Open(Protocol):
 def configure(*, on: bool) -> None:
     """Send the spans of this process, if they are wanted.
 
-    Raises
-    ------
-    ConfigurationError
-        If the extra `traces` is not installed.
+    ConfigurationError if the extra `traces` is not installed.
     """
     global _spans
     _spans = None

@@ -135,13 +135,7 @@ class _Budget:
 
     @contextlib.contextmanager
     def taken(self, amount: int) -> Iterator[None]:
-        """Take so much of it inside the block.
-
-        Raises
-        ------
-        QueueFullError
-            If others have it for too long.
-        """
+        """Take so much of it inside the block (QueueFullError if others have it for too long)."""
         with self._changed:
             if not self._changed.wait_for(lambda: self._left >= amount, _PATIENCE_SECONDS):
                 raise QueueFullError("other files are being read: try again later", retry_after=5)

@@ -309,10 +309,7 @@ _FIRST = 6
 def told_apart(files: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
     """Files of matrices and labels, and what a structure says of the others: a deck, a reduced sector.
 
-    Raises
-    ------
-    SceneError
-        More than one deck.
+    SceneError for more than one deck.
     """
     from solver.matrices.matrix_files import array_names
     from solver.matrices.readers import reader_registry as registry
@@ -334,10 +331,7 @@ def told_apart(files: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
 def deck_of(structure: Mapping[str, Any]) -> list[dict[str, Any]] | None:
     """The sets of the deck that a structure names, each with how many nodes it has; None without a deck.
 
-    Raises
-    ------
-    SceneError
-        It cannot be read, or includes other files.
+    SceneError if it cannot be read, or includes other files.
     """
     from solver.matrices.readers.numbers_in_text import FormatError
     from solver.matrices.sectors.decks import check_alone, read_deck
@@ -357,10 +351,7 @@ def deck_of(structure: Mapping[str, Any]) -> list[dict[str, Any]] | None:
 def reduced_sector(structure: Mapping[str, Any]) -> dict[str, Any]:
     """What the file of a reduced sector holds: its coordinates and nodal diameters.
 
-    Raises
-    ------
-    SceneError
-        It is none.
+    SceneError if it is none.
     """
     from solver.matrices.matrix_files import MatrixFileError
     from solver.matrices.sectors.sector_reduction import read_sector

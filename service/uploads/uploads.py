@@ -34,10 +34,7 @@ _REDUCE = (
 def format_of(asked: str | None, name: str, content_type: str) -> str:
     """The word of the format that was asked for, that of the ending of the name, or of the content type.
 
-    Raises
-    ------
-    InvalidRequestError
-        If none of them says it, or no reader has the word.
+    InvalidRequestError if none of them says it, or no reader has the word.
     """
     from solver.matrices.readers import reader_registry as registry
 
@@ -116,10 +113,7 @@ class Uploads:
     def resolved(self, body: Mapping[str, object], caller: Caller = KEYLESS) -> Mapping[str, object]:
         """A scene with what its uploads hold in place of their ids; one without uploads as it is.
 
-        Raises
-        ------
-        InvalidRequestError
-            With pointers into the scene: an upload that is not there, or that does not fit.
+        InvalidRequestError with pointers into the scene: an upload that is not there, or that does not fit.
         """
         structure = body.get("structure")
         if not isinstance(structure, Mapping) or structure.get("kind") != "matrices":
@@ -134,11 +128,8 @@ class Uploads:
         `service.uploads.matrix_summary.look` says.
 
         What a scene's structure resolves to is kept in mind: the scene is about to be used.
-
-        Raises
-        ------
-        InvalidRequestError
-            With pointers into the scene, or to the upload: one that is not there, or that does not fit.
+        InvalidRequestError with pointers into the scene, or to the upload: one that is not there, or that
+        does not fit.
         """
         structure = asked["structure"]
         if structure is None:

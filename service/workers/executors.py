@@ -145,13 +145,7 @@ class LocalExecutor:
 
 
 def executor_of(settings: Settings, registry: Registry) -> Executor:
-    """The executor that the settings ask for.
-
-    Raises
-    ------
-    ConfigurationError
-        If what it needs is not installed.
-    """
+    """The executor that the settings ask for (ConfigurationError if what it needs is not installed)."""
     limits = ProcessLimits(memory_bytes=settings.worker_memory_bytes or None)
     if settings.executor == "local" or settings.dask_scheduler is None:
         return LocalExecutor(

@@ -125,10 +125,7 @@ def _pidfd(pid: int, sentinel: int) -> int | None:
 def start(target: Callable[..., None], args: tuple[Any, ...], name: str) -> Process:
     """Start a process that ends with this one; it has one BLAS and one Numba thread.
 
-    Raises
-    ------
-    OSError
-        If it cannot be started, or the fork server ended meanwhile.
+    OSError if it cannot be started, or the fork server ended meanwhile.
     """
     until = time.monotonic() + _ANOTHER_SECONDS
     with _lock, _one_thread_each():

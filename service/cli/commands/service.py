@@ -173,8 +173,7 @@ def check(database: options.Database = None, as_json: options.Json = False) -> N
 
 
 Owner = Annotated[
-    str,
-    typer.Option("--owner", metavar="NAME", help="Whose all that it makes is.", show_default=False),
+    str, typer.Option("--owner", metavar="NAME", help="Whose all that it makes is.", show_default=False)
 ]
 Scopes = Annotated[
     list[str] | None,

@@ -109,10 +109,7 @@ def read_sources(found: Sources, deck: Path | None) -> MatrixSet | None:
 def existing_file(option: str, text: str | None) -> Path | None:
     """A file that is to be read; None if none was named.
 
-    Raises
-    ------
-    InputError
-        There is no such file.
+    InputError if there is no such file.
     """
     if text is not None and not Path(text).is_file():
         raise InputError(f"`{option}`: there is no file {text!r}")
@@ -189,10 +186,7 @@ def rows_of(table: Mapping[str, int | str], given: MatrixSet) -> dict[str, int]:
 def contacts(texts: Sequence[str] | None) -> list[dict[str, Any]]:
     """The tables [[contacts]] of texts such as ``shroud=tip:ground,kt=1e6,mu=0.3,N0=100``.
 
-    Raises
-    ------
-    InputError
-        A text that is none.
+    InputError for a text that is none.
     """
     example = "shroud=tip:ground,kt=1e6,mu=0.3,N0=100"
     return [
@@ -235,13 +229,7 @@ def excitation(texts: Sequence[str] | None, excite: str | None, first: str) -> d
 
 
 def split(option: str, text: str, example: str) -> tuple[str, tuple[str, str], dict[str, Any]]:
-    """Name, ends and values of a text ``NAME=A:B,key=value,...``.
-
-    Raises
-    ------
-    InputError
-        A text that is none.
-    """
+    """Name, ends and values of a text ``NAME=A:B,key=value,...`` (InputError for a text that is none)."""
     head, *rest = text.split(",")
     name, equals, joined = head.partition("=")
     ends = joined.split(":")

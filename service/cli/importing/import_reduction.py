@@ -243,10 +243,7 @@ def _nodes(text: str) -> str | list[int]:
 def disk(asked: ImportOptions, deck: Path | None) -> DiskOptions | None:
     """What the options say of a disk; None without --sectors.
 
-    Raises
-    ------
-    InputError
-        Options of a disk without --sectors, or values that are none.
+    InputError for those of a disk without --sectors, or values that are none.
     """
     if asked.sectors is None:
         others: dict[str, object] = {
@@ -400,10 +397,7 @@ def reduce_disk(
 def checked_boundaries(given: MatrixSet, of: DiskOptions, metres: float = 1.0) -> Any:
     """The boundaries of the sector as rows.
 
-    Raises
-    ------
-    InputError
-        Sets or nodes that are not there, or do not match.
+    InputError for sets or nodes that are not there, or do not match.
     """
     from solver.errors import SceneError
     from solver.matrices.sectors.loading import boundaries

@@ -59,10 +59,7 @@ class KeyOption:
     def in_body(self, given: Any) -> Any:
         """What stands in the body for what was given; None if the key is to be left out.
 
-        Raises
-        ------
-        InputError
-            It cannot be read, or is not finite.
+        InputError if it cannot be read, or is not finite.
         """
         if given is None or given == [] or given == self.parameter.default:
             return None

@@ -48,8 +48,7 @@ Values = Annotated[
 Harmonics = Annotated[int, count("--harmonics", "H", "Highest harmonic kept.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 Plot = Annotated[
-    str | None,
-    typer.Option("--plot", metavar="F", help="Draw a picture: .png, .svg, .pdf or .html."),
+    str | None, typer.Option("--plot", metavar="F", help="Draw a picture: .png, .svg, .pdf or .html.")
 ]
 Out = Annotated[
     str | None,
@@ -66,13 +65,9 @@ Database = Annotated[
         help="sqlite:///path or postgresql://user@host/name; STICKSLIP_DATABASE sets it too.",
     ),
 ]
-Workers = Annotated[
-    int | None,
-    count("--workers", "N", "Worker processes; one a processor."),
-]
+Workers = Annotated[int | None, count("--workers", "N", "Worker processes; one a processor.")]
 Url = Annotated[
-    str,
-    typer.Option("--url", metavar="URL", envvar="STICKSLIP_URL", help="Where the service is."),
+    str, typer.Option("--url", metavar="URL", envvar="STICKSLIP_URL", help="Where the service is.")
 ]
 Wait = Annotated[bool, typer.Option("--wait", help="Wait for the end and print the results.")]
 Job = Annotated[str, typer.Argument(metavar="JOB", help="Id of a job.")]
@@ -145,10 +140,7 @@ def keyed(command: Command) -> Command:
 def client_of(url: str, key_file: str | None) -> Client:
     """A client of the service at an address.
 
-    Raises
-    ------
-    InputError
-        If the address is none, the file cannot be read, or what is there is no key.
+    InputError if the address is none, the file cannot be read, or what is there is no key.
     """
     import httpx
 

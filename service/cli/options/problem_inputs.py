@@ -186,10 +186,7 @@ def posed(told: Description, study: type[ProblemRequest]) -> tuple[Scene, dict[s
 def checked(told: Description, model: type[ProblemRequest]) -> ProblemRequest:
     """The description with types and ranges checked; whether it fits the scene is not.
 
-    Raises
-    ------
-    InputError
-        What is wrong.
+    InputError with what is wrong.
     """
     from service.errors import InvalidRequestError
     from service.jobs.strict_json import validated
@@ -319,10 +316,7 @@ class SceneWithFiles:
 def scene_to_submit(path: str) -> dict[str, Any] | SceneWithFiles:
     """A scene file for the body of a request; one that names files of matrices waits for their upload.
 
-    Raises
-    ------
-    SceneError
-        If it cannot be read, or is wrong and names no files.
+    SceneError if it cannot be read, or is wrong and names no files.
     """
     import solver
     from solver.scene.toml import load_raw
@@ -340,10 +334,7 @@ def scene_to_submit(path: str) -> dict[str, Any] | SceneWithFiles:
 def uploaded(client: Client, body: Mapping[str, Any]) -> dict[str, Any]:
     """The body with its scene's files uploaded and referred to by their ids.
 
-    Raises
-    ------
-    InputError
-        If a file cannot be read.
+    InputError if a file cannot be read.
     """
     scene = body.get("scene")
     if not isinstance(scene, SceneWithFiles):

@@ -213,8 +213,5 @@ def check(url: str, arrays: str | None = None) -> Findings:
     more = [f"{unnamed} more arrays, results and uploads"] if unnamed > 0 else []
     head = head_revision()
     return Findings(
-        revision=head,
-        wanted=head,
-        trouble=(*trouble, *damaged[:MOST_NAMED], *more),
-        contents=held,
+        revision=head, wanted=head, trouble=(*trouble, *damaged[:MOST_NAMED], *more), contents=held
     )

@@ -284,12 +284,7 @@ class JobRepository:
         with self._db.writing() as connection:
             finished = self.now()
             changed = change_owned(
-                connection,
-                attempt,
-                state=JobState.FAILED,
-                finished=finished,
-                error=failure.to_json(),
-                **FREE,
+                connection, attempt, state=JobState.FAILED, finished=finished, error=failure.to_json(), **FREE
             )
             if changed:
                 drop_checkpoint(connection, attempt.job_id)
@@ -367,9 +362,7 @@ class JobRepository:
         """
         with self._db.writing() as connection:
             condition = and_(
-                Job.state == JobState.RUNNING,
-                Job.lease_until < self.now(),
-                Job.id.not_in(list(running_here)),
+                Job.state == JobState.RUNNING, Job.lease_until < self.now(), Job.id.not_in(list(running_here))
             )
             return recover(
                 connection, condition, "its owner gave no sign of life", self.now(), skip_locked=True

@@ -124,10 +124,7 @@ BinnedT = TypeVar("BinnedT", bound=InBin)
 def visible(row: OwnedT | None, sees: str | None, missing: str) -> OwnedT:
     """The row, if there is one and who `sees` an owner's things (None: everybody's) may see it.
 
-    Raises
-    ------
-    NotFoundError
-        With the words `missing`: the same for what is not there and for what is another's.
+    NotFoundError with `missing`, the same for what is not there and for another's.
     """
     if row is None or sees not in (None, row.owner):
         raise NotFoundError(missing, withheld=row is not None)
@@ -260,11 +257,7 @@ class Binned(Generic[BinnedT]):
         return row
 
     def change(
-        self,
-        row_id: str,
-        changes: Mapping[str, Any],
-        expected: Collection[int] | None,
-        sees: str | None,
+        self, row_id: str, changes: Mapping[str, Any], expected: Collection[int] | None, sees: str | None
     ) -> BinnedT:
         """Change what is said of a thing.
 
@@ -510,10 +503,7 @@ class KeyRepository(Rows[ApiKey]):
     def rotate(self, key_id: str) -> Made[ApiKey]:
         """Give a key another secret; the old one ends.
 
-        Raises
-        ------
-        NotFoundError
-            If there is none of this id, or it was revoked.
+        NotFoundError if there is none of this id, or it was revoked.
         """
         _, token = KEYS.new(key_id)
         self._change(key_id, digest=digest_of(token))

@@ -170,10 +170,7 @@ class ResultRepository:
 def whole(store: ArrayStore | None, row: Any) -> StoredArray:
     """An array with its bytes, from a row with its job, digest, bytes and size.
 
-    Raises
-    ------
-    DatabaseError
-        If it is outside of the database and cannot be had from there.
+    DatabaseError if it is outside of the database and cannot be had from there.
     """
     if row.size is None:
         return StoredArray(sha256=row.sha256, data=row.data)
@@ -303,10 +300,7 @@ def _condition(
 def _place(after: Position | None, keys: int) -> list[Any] | None:
     """Where a page goes on: the value it is sorted by, if it is, and the number of a result.
 
-    Raises
-    ------
-    InvalidRequestError
-        If the position is not one of a list of results.
+    InvalidRequestError if the position is not one of a list of results.
     """
     if after is None:
         return None

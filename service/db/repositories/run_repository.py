@@ -114,10 +114,7 @@ def in_the_bin(job_id: InstrumentedAttribute[str]) -> ColumnElement[bool]:
 def require_project(connection: Connection, project: str | None, owner: str | None) -> None:
     """Refuse a project that is not there.
 
-    Raises
-    ------
-    InvalidRequestError
-        If the owner has none of this id outside of the bin.
+    InvalidRequestError if the owner has none of this id outside of the bin.
     """
     if project is None:
         return
@@ -290,11 +287,7 @@ class Runs(Binned[RunRow]):
 
 
 def _conditions(wanted: RunFilter, *, sqlite: bool) -> list[Condition]:
-    equal = (
-        (Job.kind, wanted.kind),
-        (Job.scene_name, wanted.scene),
-        (Job.owner, wanted.owner),
-    )
+    equal = ((Job.kind, wanted.kind), (Job.scene_name, wanted.scene), (Job.owner, wanted.owner))
     found = [column == value for column, value in equal if value is not None]
     if wanted.status:
         found.append(Job.state.in_(list(wanted.status)))
@@ -459,10 +452,7 @@ class Shares(Rows[Share]):
     def run_of(self, token: str) -> RunRow:
         """The run that a link is to.
 
-        Raises
-        ------
-        NotFoundError
-            The link is none, has ended, or its run is in the bin.
+        NotFoundError if the link is none, has ended, or its run is in the bin.
         """
         share_id = _TOKENS.id_of(token)
         row = None if share_id is None else self.get(share_id)

@@ -140,13 +140,7 @@ class Room:
         self._transaction: object = None
 
     def require(self, connection: Connection, limit: int) -> None:
-        """Count one more job.
-
-        Raises
-        ------
-        QueueFullError
-            `limit` jobs wait already.
-        """
+        """Count one more job (QueueFullError if `limit` jobs wait already)."""
         fresh = time.monotonic() - self._counted < _COUNT_SECONDS
         transaction = connection.get_transaction()
         counted_here = transaction is self._transaction

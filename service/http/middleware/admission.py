@@ -207,12 +207,8 @@ def _token(request: Request) -> str | None:
 def _refuse_other_pages(request: Request) -> None:
     """Refuse changes that a web page elsewhere has its visitor's browser ask for.
 
-    Browsers say so: `Sec-Fetch-Site`, and older ones `Origin`. Programs send neither.
-
-    Raises
-    ------
-    OriginRefusedError
-        If the page is not one of this service.
+    Browsers say so: `Sec-Fetch-Site`, and older ones `Origin`. Programs send neither. OriginRefusedError if
+    the page is not one of this service.
     """
     if request.method in _READING:
         return

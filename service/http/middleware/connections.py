@@ -98,10 +98,7 @@ class Connections:
     def require_taken(self, owner: str) -> None:
         """Refuse an owner whose clients leave too much untaken; those of them who stall are disconnected.
 
-        Raises
-        ------
-        TooManyRequestsError
-            If it is too much all the same.
+        TooManyRequestsError if it is too much all the same.
         """
         held = sorted((one for one in self._paused if one.owner == owner), key=lambda one: one.since)
         unsent = _together(held)

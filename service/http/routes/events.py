@@ -211,11 +211,7 @@ class _WatchedJob:
     headers_only: bool
 
 
-async def _watched(
-    job_id: str,
-    context: InContext,
-    last_event_id: LastEventId = None,
-) -> _WatchedJob:
+async def _watched(job_id: str, context: InContext, last_event_id: LastEventId = None) -> _WatchedJob:
     """The job to follow; refused here, before the answer begins, if there is none."""
     request, service, caller = context.request, context.service, context.caller
     row = await service.lanes.reads.run(caller.owner, service.job, job_id, caller)

@@ -30,13 +30,7 @@ from service.http.dependencies import (
 from service.http.in_lane import prepared, reading
 from service.http.made_once import LargeAnswers
 from service.jobs.kind_registry import KIND, JobRequest, Registry
-from service.jobs.kinds.bodies import (
-    DESIGN,
-    any_body,
-    design_body,
-    examples,
-    examples_of,
-)
+from service.jobs.kinds.bodies import DESIGN, any_body, design_body, examples, examples_of
 from service.queue.core import Service
 from service.schemas.answers import (
     Cursor,

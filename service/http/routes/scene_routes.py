@@ -224,8 +224,5 @@ async def preview(body: PreviewRequest, context: InContext) -> Response:
 
 takes_body(preview, any_body(PREVIEWS), examples(PREVIEWS), by=KIND)
 previews.add_api_route(
-    "",
-    preview,
-    methods=["POST"],
-    response_model=reduce(or_, (kind.answers for kind in PREVIEWS)),
+    "", preview, methods=["POST"], response_model=reduce(or_, (kind.answers for kind in PREVIEWS))
 )

@@ -97,10 +97,7 @@ class OfScene(Protocol):
 def resolve_scene(request: OfScene, source: SceneSource) -> Scene:
     """The scene of a request with its values set.
 
-    Raises
-    ------
-    InvalidRequestError
-        With pointers below ``/scene`` and ``/set``.
+    InvalidRequestError with pointers below ``/scene`` and ``/set``.
     """
     scene = _read(request.scene, source)
     issues: list[Issue] = []
@@ -171,10 +168,7 @@ def with_named(structure: Mapping[str, Any], names: Mapping[Place, str]) -> dict
 def read_scene(body: Mapping[str, object], *place: str) -> Scene:
     """A scene from a request body.
 
-    Raises
-    ------
-    InvalidRequestError
-        Lists everything that is wrong, with subjects below `place`.
+    InvalidRequestError with everything that is wrong, with subjects below `place`.
     """
     from solver.scene.scene import Scene
 
@@ -209,10 +203,7 @@ def resolved(scene: Scene, **settings: object) -> Resolved:
 def stored_scene(spec: Mapping[str, Any]) -> Scene:
     """The scene of a spec; it is checked again if another version did so.
 
-    Raises
-    ------
-    SceneError
-        It does not fit this version.
+    SceneError if it does not fit this version.
     """
     from solver.scene.scene import Scene
 

@@ -63,13 +63,7 @@ def report_of(given: Designed, form: str) -> bytes:
 
 
 def require_pdf() -> None:
-    """Have what writes a PDF.
-
-    Raises
-    ------
-    InputError
-        It is not installed.
-    """
+    """Have what writes a PDF (InputError if it is not installed)."""
     try:
         import weasyprint  # noqa: F401 - whether it is there, with the library of the system that it loads
     except (ImportError, OSError) as error:

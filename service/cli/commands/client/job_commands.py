@@ -38,14 +38,8 @@ OfScene = Annotated[
 OfVariable = Annotated[
     str | None, typer.Option("--variable", metavar="PATH", help="Designs that chose it; for the list.")
 ]
-PeakMax = Annotated[
-    float | None,
-    amount("--peak-max", "A", "Highest peak at most [m]; for the list."),
-]
-BandMax = Annotated[
-    float | None,
-    amount("--band-max", "HZ", "Band at most [Hz]; for the list."),
-]
+PeakMax = Annotated[float | None, amount("--peak-max", "A", "Highest peak at most [m]; for the list.")]
+BandMax = Annotated[float | None, amount("--band-max", "HZ", "Band at most [Hz]; for the list.")]
 Reached = Annotated[
     bool | None,
     typer.Option(
@@ -60,10 +54,7 @@ Sort = Annotated[
         "-created.",
     ),
 ]  # fmt: skip
-Most = Annotated[
-    int | None,
-    count("--count", "N", f"At most so many; {MOST}."),
-]
+Most = Annotated[int | None, count("--count", "N", f"At most so many; {MOST}.")]
 
 
 def refuse_filters(filters: Mapping[str, Any]) -> None:
@@ -105,13 +96,7 @@ def _chosen(name: str, value: float | None) -> str:
 
 
 def listed(ask: Callable[..., Iterator[_T]], count: int | None, **filters: Any) -> list[_T]:
-    """The first of what a list holds, as many as ``--count`` says.
-
-    Raises
-    ------
-    InputError
-        It says less than one.
-    """
+    """The first of what a list holds, as many as ``--count`` says (InputError if it says less than one)."""
     most = MOST if count is None else count
     if most < 1:
         raise InputError(f"`--count` must be >= 1, got {most!r}")
@@ -304,13 +289,7 @@ def report(
 
 
 def write(given: Designed, target: Path) -> None:
-    """Write a report as its suffix says.
-
-    Raises
-    ------
-    InputError
-        A PDF, where what writes it is not installed.
-    """
+    """Write a report as its suffix says (InputError for a PDF, where what writes it is not installed)."""
     from service.rendering.report.making import report_of
     from solver.results.files import whole
 

@@ -36,13 +36,7 @@ Days = Annotated[float | None, amount("--days", "N", "After which the link ends;
 
 
 def given_of(**changes: Any) -> dict[str, Any]:
-    """The changes that were given.
-
-    Raises
-    ------
-    InputError
-        None was.
-    """
+    """The changes that were given (InputError if none was)."""
     given = {key: value for key, value in changes.items() if value is not None}
     if not given:
         raise InputError(f"give what is to be changed: {', '.join(f'--{key}' for key in changes)}")
@@ -160,11 +154,7 @@ def create_project(client: Client, name: NewName, notes: Notes = None, as_json: 
 
 
 def change_project(
-    client: Client,
-    project: Project,
-    name: Name = None,
-    notes: Notes = None,
-    as_json: options.Json = False,
+    client: Client, project: Project, name: Name = None, notes: Notes = None, as_json: options.Json = False
 ) -> None:
     """Change name or notes of a project."""
     changes = given_of(name=name, notes=notes)

@@ -13,12 +13,7 @@ from optim.problem.problem_keys import options as key_options_of
 from service.cli.commands.client.job_commands import hand_in, scene_of
 from service.cli.options import inputs, problem_inputs
 from service.cli.options import parameters as options
-from service.cli.options.key_options import (
-    SCENE,
-    KeyOption,
-    key_options,
-    options_of,
-)
+from service.cli.options.key_options import SCENE, KeyOption, key_options, options_of
 from service.cli.options.parameters import Command, keyed, keyword, with_parameters
 from service.cli.options.problem_inputs import FLAGS, ProblemFlags, takes_problem
 from service.cli.table import TOP, CommandEntry
