@@ -105,12 +105,8 @@ class AtATime:
     def taken(self, owner: str, most: int | None) -> Iterator[None]:
         """Count one more inside the block.
 
-        Raises
-        ------
-        TooManyRequestsError
-            The owner has `most` already.
-        OverloadedError
-            All owners together have as many as there may be.
+        TooManyRequestsError if the owner has `most` already; OverloadedError if all owners together have as
+        many as there may be.
         """
         with self._lock:
             if most is not None and self._held[owner] >= most:

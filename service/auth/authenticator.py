@@ -127,12 +127,8 @@ class Authenticator:
     def admit(self, token: str | None, address: str) -> Caller:
         """Who asks.
 
-        Raises
-        ------
-        UnauthorizedError
-            The key is none, or does not work.
-        TooManyRequestsError
-            Too many keys that do not work came from this address.
+        UnauthorizedError if the key is none, or does not work; TooManyRequestsError if too many keys that do
+        not work came from this address.
         """
         if token is None:
             return _paying(f"from {_neighbourhood(address)}") if self._settings.keys_required else KEYLESS
@@ -149,12 +145,7 @@ class Authenticator:
     def require(self, caller: Caller, scope: Scope) -> None:
         """Refuse who may not do what needs `scope`.
 
-        Raises
-        ------
-        UnauthorizedError
-            There was no key.
-        ForbiddenError
-            The key has not the scope.
+        UnauthorizedError if there was no key; ForbiddenError if the key has not the scope.
         """
         if caller.may(scope):
             return
@@ -166,12 +157,8 @@ class Authenticator:
     def reader(self, token: str, address: str) -> tuple[Caller, RunRow]:
         """Who reads by a link, and the run that it is to; each link pays for itself.
 
-        Raises
-        ------
-        NotFoundError
-            The link is none, or has ended.
-        TooManyRequestsError
-            Too many of those came from this address.
+        NotFoundError if the link is none, or has ended; TooManyRequestsError if too many of those came from
+        this address.
         """
         try:
             run = self._shares.run_of(token)

@@ -76,12 +76,8 @@ class FileLock:
     def acquire(self) -> None:
         """Take the lock.
 
-        Raises
-        ------
-        DatabaseInUseError
-            If another process, or another service in this one, holds it.
-        DatabaseError
-            If the lock file cannot be made.
+        DatabaseInUseError if another process, or another service in this one, holds it; DatabaseError if the
+        lock file cannot be made.
         """
         try:
             make_private(self._path)

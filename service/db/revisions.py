@@ -86,12 +86,8 @@ def _without_services(url: str) -> Iterator[Connection]:
 def upgrade(url: str, target: str = "head") -> str:
     """Bring a database to a revision (`stickslip db upgrade`); returns the revision it has then.
 
-    Raises
-    ------
-    DatabaseInUseError
-        If a service is running on it.
-    DatabaseError
-        If it cannot be used, holds another program's tables, or is newer than this version.
+    DatabaseInUseError if a service is running on it; DatabaseError if it cannot be used, holds another
+    program's tables, or is newer than this version.
     """
     with _without_services(url) as connection:
         revision, empty = _current(connection)
@@ -116,14 +112,9 @@ def off_head(url: str, does: str) -> str | None:
 def prepare(url: str) -> None:
     """Make a new database's tables, or check those of an existing one.
 
-    On SQLite the caller holds the lock of the file; on PostgreSQL services may run.
-
-    Raises
-    ------
-    WrongRevisionError
-        With the command that brings the database to the right revision.
-    DatabaseError
-        If it cannot be used or holds another program's tables.
+    On SQLite the caller holds the lock of the file; on PostgreSQL services may run. WrongRevisionError with
+    the command that brings the database to the right revision; DatabaseError if it cannot be used or holds
+    another program's tables.
     """
     with migrating(url) as connection:
         revision, empty = _current(connection)

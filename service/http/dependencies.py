@@ -50,12 +50,8 @@ _LARGE_AT_ONCE = 2
 async def chunks(request: Request, limit: int, seconds: float) -> AsyncIterator[bytes]:
     """Yield a body piece by piece.
 
-    Raises
-    ------
-    UnsupportedMediaError
-        If it is compressed.
-    BodyTooLargeError, SlowBodyError
-        If it has more than `limit` bytes, or needs more than `seconds` to arrive.
+    UnsupportedMediaError if it is compressed; BodyTooLargeError, SlowBodyError if it has more than `limit`
+    bytes, or needs more than `seconds` to arrive.
     """
     encoding = request.headers.get("content-encoding", "identity").strip().lower()
     if encoding != "identity":
@@ -187,10 +183,8 @@ InContext = Annotated[Context, Depends(context_of)]
 async def json_body(context: InContext) -> AsyncIterator[dict[str, Any]]:
     """The body of a request as a JSON object, no larger than the settings allow, until it is answered.
 
-    Raises
-    ------
-    UnsupportedMediaError, BodyTooLargeError, SlowBodyError, MalformedBodyError, InvalidRequestError
-        For a body that is not that.
+    UnsupportedMediaError, BodyTooLargeError, SlowBodyError, MalformedBodyError, InvalidRequestError for a
+    body that is not that.
     """
     request, settings = context.request, context.service.settings
     kind = request.headers.get("content-type", "").split(";")[0].strip().lower()

@@ -55,12 +55,8 @@ class _Server(uvicorn.Server):
 def serve(settings: Settings, registry: Registry | None = None) -> None:
     """Serve HTTP until SIGINT or SIGTERM; jobs that run then go back to the queue.
 
-    Raises
-    ------
-    ConfigurationError
-        If the address cannot be used.
-    DatabaseError
-        If the database cannot be used (see `Service.start`).
+    ConfigurationError if the address cannot be used; DatabaseError if the database cannot be used (see
+    `Service.start`).
     """
     logs.configure(settings.log_level, settings.log_format)
     app = create_app(settings, registry)

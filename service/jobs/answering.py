@@ -86,17 +86,14 @@ def prepared(
 ) -> Prepared:  # fmt: skip
     """Resolve a request for a job.
 
+    InvalidRequestError with everything that is wrong.
+
     Parameters
     ----------
     request, body : what is asked of the kind, and as it came, with its kind.
     work : limit of the caller's key.
     memory : most that the dense matrices may take [bytes].
     version : of the solver, on which results depend.
-
-    Raises
-    ------
-    InvalidRequestError
-        Lists everything that is wrong.
     """
     with work_limited(work), memory_limited(memory):
         found = resolve(request, source)

@@ -42,6 +42,8 @@ def result_figure(
 ) -> Figure:
     """The picture of a job.
 
+    NothingToDrawError if the job found nothing, or stored no sweep.
+
     Parameters
     ----------
     kind : of the job.
@@ -49,11 +51,6 @@ def result_figure(
     sweeps : those it stored.
     read : gives a stored sweep with its arrays.
     registry : the kinds there are; results of others are drawn as their stored sweep.
-
-    Raises
-    ------
-    NothingToDrawError
-        The job found nothing, or stored no sweep.
     """
     known = registry[kind].view.draw if kind in registry else None
     return (known or best_sweep_figure)(result, sweeps, read)

@@ -95,15 +95,12 @@ class Division:
     ) -> JobOutput:
         """Compute the parts, here and by who helps, and join them: the `run` of the kind.
 
+        PartStoppedError if it was told to stop.
+
         Parameters
         ----------
         known : outputs of earlier attempts by their place, which are not computed again.
         on_part : called with the place and the output of every part computed.
-
-        Raises
-        ------
-        PartStoppedError
-            It was told to stop.
         """
         parts = self.split(spec)
         outputs = dict(known or {})

@@ -109,10 +109,7 @@ def _parsed(data: bytes, numbers: _Numbers) -> object:
 def _measure(data: bytes) -> None:
     """Refuse what would take much memory or a deep stack, before it is read.
 
-    Raises
-    ------
-    MalformedBodyError, BodyTooLargeError
-        As `loads`.
+    MalformedBodyError, BodyTooLargeError as `loads`.
     """
     if len(data) <= MOST_DEPTH:
         return

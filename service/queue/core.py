@@ -322,12 +322,7 @@ class Service:
     def results(self, job_id: str, caller: Caller = KEYLESS) -> Results:
         """What a job computed; of a failed one, what it computed all the same.
 
-        Raises
-        ------
-        ConflictError
-            If it has not ended, or was dismissed.
-        JobFailedError
-            If it failed and computed nothing.
+        ConflictError if it has not ended, or was dismissed; JobFailedError if it failed and computed nothing.
         """
         row = self.job(job_id, caller)
         source = row.result_of or row.id

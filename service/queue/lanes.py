@@ -55,10 +55,8 @@ class Lane:
     async def run(self, owner: str, work: Callable[_P, _T], *args: _P.args, **values: _P.kwargs) -> _T:
         """Do `work` in a thread when it is the owner's turn.
 
-        Raises
-        ------
-        TooManyRequestsError, OverloadedError
-            If that is not in time: the owner has their share of the threads, or others have all of them.
+        TooManyRequestsError, OverloadedError if that is not in time: the owner has their share of the
+        threads, or others have all of them.
         """
         begun = time.perf_counter()
         await self._enter(owner)

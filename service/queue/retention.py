@@ -228,18 +228,13 @@ def prune_database(
 ) -> Pruned:
     """Delete the jobs that ended longer ago than `seconds`, and uploads as old, or count them.
 
-    What was put in the bin longer ago goes with them, designs too.
+    What was put in the bin longer ago goes with them, designs too. DatabaseInUseError if an SQLite file is in
+    use by a service; DatabaseError if there is no such database, it cannot be used, or it is at another
+    revision.
 
     Parameters
     ----------
     arrays : where large arrays are, if that is outside of the database.
-
-    Raises
-    ------
-    DatabaseInUseError
-        An SQLite file is in use by a service.
-    DatabaseError
-        There is no such database, it cannot be used, or it is at another revision.
     """
     name = database_name(url)
     if vacuum and not is_sqlite(url):

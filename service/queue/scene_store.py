@@ -68,12 +68,8 @@ class SceneStore:
     def add(self, body: Mapping[str, object]) -> tuple[StoredScene, bool]:
         """Store a scene under its own name; whether it is new.
 
-        Raises
-        ------
-        InvalidRequestError
-            If it is not a scene.
-        ConflictError
-            If another scene of the caller's has the name: a name means one scene for ever.
+        InvalidRequestError if it is not a scene; ConflictError if another scene of the caller's has the name:
+        a name means one scene for ever.
         """
         scene = read_scene(self.with_uploads(body))
         tables = scene.to_dict()

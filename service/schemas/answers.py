@@ -484,15 +484,12 @@ def page_of(
 ) -> tuple[Sequence[RowT], str | None]:
     """The rows of a page and the link to the next one, None on the last.
 
+    InvalidRequestError if the cursor is not one of this service.
+
     Parameters
     ----------
     read : finds so many rows at most, those behind a position if there is one.
     position : where a page that ends with a row goes on.
-
-    Raises
-    ------
-    InvalidRequestError
-        If the cursor is not one of this service.
     """
     limit = min(query.limit, settings.page_limit)
     rows = read(limit + 1, None if query.cursor is None else pagination.decode(query.cursor))

@@ -191,10 +191,8 @@ def result_page(
 ) -> ResultPage:  # fmt: skip
     """A page of results of whatever kind and the link to the next one.
 
-    Raises
-    ------
-    InvalidRequestError
-        If there is no such kind, or it has no such figure; or the cursor is not of this service.
+    InvalidRequestError if there is no such kind, or it has no such figure; or the cursor is not of this
+    service.
     """
     known = quantities(query.of, registry)
     record = _record(query.of)

@@ -22,16 +22,13 @@ _ENTRY = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")
 def registry_of(entries: Iterable[str], base: Registry = SHIPPED) -> Registry:
     """The kinds that come with the service and those of `entries`.
 
+    ConfigurationError if an entry is none, cannot be imported, is no kind, or has a name that is taken.
+
     Parameters
     ----------
     entries : ``module:NAME`` each: a `Study`, a `JobKind`, or a sequence of them, at the top level of a
         module that can be imported.
     base : the kinds there are without them.
-
-    Raises
-    ------
-    ConfigurationError
-        An entry is none, cannot be imported, is no kind, or has a name that is taken.
     """
     kinds: dict[str, str] = {kind.name: "the service itself" for kind in base}
     found: list[JobKind] = []

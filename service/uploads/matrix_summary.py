@@ -34,15 +34,12 @@ _SHOWN = 10
 def look(asked: Mapping[str, Any]) -> dict[str, Any]:
     """What the files of a structure hold; with its DOFs also the scene, and what its structure resolves to.
 
+    SceneError with pointers into the scene that is asked for.
+
     Parameters
     ----------
     asked : `files` or `structure` (whose keys name files of the working directory), and for a scene `name`,
         `contacts`, `excitation` and `observe`.
-
-    Raises
-    ------
-    SceneError
-        With pointers into the scene that is asked for.
     """
     from solver.matrices.load_set import MatrixSet
     from solver.matrices.matrix_files import read_modes
@@ -238,18 +235,13 @@ def started(asked: Mapping[str, Any], structure: Mapping[str, Any]) -> tuple[Sce
 
     The band is an octave on each side of the first elastic frequency. A contact begins as stiff as the
     structure is where it acts, under a load whose friction is of the size of the excitation in that mode:
-    values to begin a search from.
+    values to begin a search from. SceneError with everything that is wrong.
 
     Parameters
     ----------
     asked : `name`, `contacts` (each `name` and `between`), `excitation` and `observe` (each its `dof`). Of
         a sector the excitation also has its `engine_order`, whose nodal diameter counts.
     structure : its tables, files read.
-
-    Raises
-    ------
-    SceneError
-        Lists everything that is wrong.
     """
     from solver.linear.assembly import linear_model
     from solver.matrices.diagnostics import rigid_body_modes
@@ -368,14 +360,12 @@ def kept_sector(
 ) -> tuple[dict[str, Any], ReducedSector | None]:
     """The tables of a sector as a scene keeps them, and the reduction if they ask for one.
 
+    SceneError for a model too large as it stands, boundaries that do not match, or anything else that cannot
+    be used.
+
     Parameters
     ----------
     rows : of its matrices; None for a reduced one.
-
-    Raises
-    ------
-    SceneError
-        A model too large as it stands, boundaries that do not match, or anything else that cannot be used.
     """
     from solver.matrices.scene_files import sector_with_files
     from solver.matrices.sectors.loading import MOST_SECTORS

@@ -198,16 +198,13 @@ def contacts(texts: Sequence[str] | None) -> list[dict[str, Any]]:
 def excitation(texts: Sequence[str] | None, excite: str | None, first: str) -> dict[str, Any]:
     """What the table [excitation] says of place and amplitude.
 
+    InputError for a text that is none, a DOF named twice, or both options.
+
     Parameters
     ----------
     texts : such as ``tip=20``, each a DOF and its force [N].
     excite : the DOF of `--excite`.
     first : the DOF of the force if nothing is said.
-
-    Raises
-    ------
-    InputError
-        A text that is none, a DOF named twice, or both options.
     """
     if not texts:
         return {"dof": excite or first, "amplitude": 1.0}

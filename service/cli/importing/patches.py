@@ -159,15 +159,12 @@ class Patches:
     ) -> tuple[dict[str, int | str], dict[str, list[dict[str, Any]]]]:
         """What the patches add to a scene: DOFs of their nodes that had no name, each with its label; tables.
 
+        InputError if the rows of the matrices have no names, or a node has no row.
+
         Parameters
         ----------
         given : the matrices.
         known : DOFs that have a name already, each with its row or label.
-
-        Raises
-        ------
-        InputError
-            The rows of the matrices have no names, or a node has no row.
         """
         if self._nodes and (given is None or given.labels is None):
             raise InputError(

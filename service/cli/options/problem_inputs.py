@@ -134,17 +134,14 @@ class Description:
 def description(scene: str | None, flags: ProblemFlags, kind: str, **further: tuple[str, Any]) -> Description:
     """Put the file and the options together.
 
+    InputError if an option or the file cannot be read, or there is no scene.
+
     Parameters
     ----------
     scene : the argument of the command.
     flags : the options that all kinds of problem have.
     kind : of the problem; a file may say it too.
     further : key to the option that this command has besides, and its value.
-
-    Raises
-    ------
-    InputError
-        An option or the file cannot be read, or there is no scene.
     """
     file = None if flags.file is None else Path(flags.file)
     body = {} if file is None else _read(file, kind)
@@ -161,15 +158,12 @@ def description(scene: str | None, flags: ProblemFlags, kind: str, **further: tu
 def posed(told: Description, study: type[ProblemRequest]) -> tuple[Scene, dict[str, Any]]:
     """The scene and the arguments of the design layer, checked as the service checks them.
 
+    InputError, SceneError with what is wrong, by the option or the key that has to change.
+
     Parameters
     ----------
     told : what was given.
     study : its types and ranges, and what is wrong with a problem for a scene.
-
-    Raises
-    ------
-    InputError, SceneError
-        What is wrong, by the option or the key that has to change.
     """
     from service.jobs.common.problem_requests import arguments
 

@@ -403,14 +403,12 @@ class Shares(Rows[Share]):
     def add(self, job_id: str, days: float | None, sees: str | None, most: int = MOST_SHARES) -> Made[Share]:
         """Make a link to a run.
 
+        NotFoundError, ConflictError, StorageFullError if there is no such run, it is in the bin, it has
+        `most` links.
+
         Parameters
         ----------
         days : after which it ends; None for never.
-
-        Raises
-        ------
-        NotFoundError, ConflictError, StorageFullError
-            There is no such run, it is in the bin, it has `most` links.
         """
         self._runs.outside(job_id, sees)
         share_id, token = _TOKENS.new()

@@ -49,10 +49,7 @@ class ConcurrencyLimits:
     def passed(self, caller: Caller, scope: Scope) -> Iterator[None]:
         """Count a request inside the block; a stream counts as a stream alone, it is cheap and lasts.
 
-        Raises
-        ------
-        TooManyRequestsError, OverloadedError
-            The owner, or all together, have as many as they may.
+        TooManyRequestsError, OverloadedError if the owner, or all together, have as many as they may.
         """
         owner = caller.owner
         connection: Connection | None = scope.get("state", {}).get(KEY)

@@ -230,15 +230,12 @@ VENDOR = "/vendor/"
 def bundle(files: Mapping[str, str], entry: str) -> str:
     """Return one module that does what `entry` does.
 
+    ValueError for a module that is not there, goes in a circle or is written in another way.
+
     Parameters
     ----------
     files : the text of each module by its path.
     entry : the path of the first; the bundle stands beside it.
-
-    Raises
-    ------
-    ValueError
-        A module that is not there, goes in a circle or is written in another way.
     """
     heads: dict[str, str] = {}
     bodies: dict[str, str] = {}

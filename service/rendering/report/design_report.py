@@ -45,14 +45,11 @@ _MOST_PARAMETERS = 8
 def design_report(given: Designed) -> str:
     """The report as a page of HTML.
 
+    SettingError, SceneError if the optimum does not fit the scene.
+
     Parameters
     ----------
     given : what was designed: the result of a design, or of a front.
-
-    Raises
-    ------
-    SettingError, SceneError
-        The optimum does not fit the scene.
     """
     chosen = _chosen(given.result)
     optimum = by_path(chosen["optimum"])
@@ -142,14 +139,11 @@ _COLORS = {"nominal": style.SKY, "robust": style.VERMILION}
 def robust_report(given: Designed) -> str:
     """The report as a page of HTML.
 
+    SettingError, SceneError if the optimum does not fit the scene.
+
     Parameters
     ----------
     given : what was designed; its result is that of `optim.robust_design`.
-
-    Raises
-    ------
-    SettingError, SceneError
-        The optimum does not fit the scene.
     """
     found = given.result
     optimum = by_path(found["optimum"])

@@ -37,17 +37,13 @@ body { font-family: "DejaVu Sans", sans-serif !important; }
 def report_of(given: Designed, form: str) -> bytes:
     """The report of a design, of a front, of a robust design or of an identification.
 
+    InputError for a PDF, where what writes it is not installed; SettingError, SceneError if the optimum does
+    not fit the scene.
+
     Parameters
     ----------
     given : what was designed.
     form : one of `FORMS`.
-
-    Raises
-    ------
-    InputError
-        A PDF, where what writes it is not installed.
-    SettingError, SceneError
-        The optimum does not fit the scene.
     """
     from service.rendering.report.design_report import design_report, robust_report
     from service.rendering.report.identification import identification_report
@@ -102,17 +98,15 @@ def report_apart(
 ) -> bytes:  # fmt: skip
     """The report of a design, as bytes of the form.
 
+    ConflictError if it takes more time or memory than it may, or there is nothing to report; the message says
+    what to do.
+
     Parameters
     ----------
     scene, problem, result, about : as `service.rendering.report.sections.Designed` has them, the scene as
         tables.
     form : one of `service.rendering.report.making.FORMS`.
     seconds : longest time it may take.
-
-    Raises
-    ------
-    ConflictError
-        It takes more time or memory than it may, or there is nothing to report; the message says what to do.
     """
     argument = {"scene": dict(scene), "problem": dict(problem), "result": dict(result), "about": dict(about),
                 "form": form}  # fmt: skip

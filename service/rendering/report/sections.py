@@ -119,10 +119,7 @@ def linear_lines(scene: Scene, paths: Sequence[str]) -> list[ReportLine]:
 def in_scenario(scene: Scene, scenario: Mapping[str, Any]) -> Scene:
     """A design in a scenario of its uncertainty, from the scenario's JSON.
 
-    Raises
-    ------
-    SettingError, SceneError
-        The scenario does not fit the scene.
+    SettingError, SceneError if the scenario does not fit the scene.
     """
     values: dict[str, float] = {}
     for one in scenario["parameters"]:
