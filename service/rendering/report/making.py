@@ -45,8 +45,7 @@ def report_of(given: Designed, form: str) -> bytes:
     given : what was designed.
     form : one of `FORMS`.
     """
-    from service.rendering.report.design_report import design_report, robust_report
-    from service.rendering.report.identification import identification_report
+    from service.rendering.report.design_report import design_report, identification_report, robust_report
 
     if form == PDF:
         require_pdf()
