@@ -331,9 +331,7 @@ def _root(
 def command(asked: str = "") -> LazyGroup:
     """Return `stickslip` with every command under it, each imported when it is used.
 
-    Parameters
-    ----------
-    asked : the command that is used: what is no command of the package may be a study of another one.
+    `asked`: the command that is used: what is no command of the package may be a study of another one.
     """
     root = typer.main.get_command(_app)
     if not isinstance(root, LazyGroup):

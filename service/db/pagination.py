@@ -56,11 +56,9 @@ def owner_condition(
 ) -> list[Condition]:
     """The condition that rows are an owner's; none for everybody's (None).
 
-    Parameters
-    ----------
-    leads : whether nothing else names an index: the one of the owner, in the order of the ids, is then the
-        way. Else SQLite must not take it: without statistics it holds every equality for rare, and would sort
-        all rows of an owner who has most of them. An owner of few rows leads all the same (see `met`).
+    `leads` says whether nothing else names an index: the one of the owner, in the order of the ids, is then
+    the way. Else SQLite must not take it: without statistics it holds every equality for rare, and would sort
+    all rows of an owner who has most of them. An owner of few rows leads all the same (see `met`).
     """
     if owner is None:
         return []

@@ -164,9 +164,7 @@ _MOST_FAILED = 64
 class Reports:
     """Reports that were made, and those that are being made. All happens on one event loop.
 
-    Parameters
-    ----------
-    lane : in which they are made.
+    `lane`: in which they are made.
     """
 
     def __init__(self, lane: Lane) -> None:

@@ -242,9 +242,7 @@ _OF: dict[tuple[str, str], tuple[str, ...]] = {
 def describe(description: dict[str, Any], problem: dict[str, Any]) -> None:
     """Give every operation of an OpenAPI document its errors, each with an example.
 
-    Parameters
-    ----------
-    problem : the schema of a problem document.
+    `problem` is the schema of a problem document.
     """
     components = description["components"]
     components["schemas"]["Problem"] = problem

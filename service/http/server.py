@@ -88,11 +88,7 @@ def work(settings: Settings, registry: Registry | None = None, *, until_empty: b
     On PostgreSQL this adds workers to the services that run, from any machine. On SQLite one process owns
     the file: this works off the jobs that wait in it while no service does.
 
-    Parameters
-    ----------
-    until_empty : end when no job waits or runs.
-
-    `Service.open` lists the errors.
+    `Service.open` lists the errors. `until_empty`: end when no job waits or runs.
     """
     logs.configure(settings.log_level, settings.log_format)
     stop = threading.Event()

@@ -230,11 +230,7 @@ def prune_database(
 
     What was put in the bin longer ago goes with them, designs too. DatabaseInUseError if an SQLite file is in
     use by a service; DatabaseError if there is no such database, it cannot be used, or it is at another
-    revision.
-
-    Parameters
-    ----------
-    arrays : where large arrays are, if that is outside of the database.
+    revision. `arrays`: where large arrays are, if that is outside of the database.
     """
     name = database_name(url)
     if vacuum and not is_sqlite(url):

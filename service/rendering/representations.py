@@ -118,9 +118,7 @@ def sweep_body(
 ) -> bytes:
     """A stored sweep in a media type of `SWEEP_MEDIA`: the files are those that `solver.save` writes.
 
-    Parameters
-    ----------
-    scene : that of its job.
+    `scene`: that of its job.
     """
     if media == JSON:
         return SweepDetail.load(row, repository).model_dump_json().encode()
@@ -132,9 +130,7 @@ def sweep_picture(
 ) -> bytes:
     """The curve of a stored sweep as `svg` or `png`; its peak is marked, its band shaded.
 
-    Parameters
-    ----------
-    scene : that of its job; it names the axis only if it is the one that was swept.
+    `scene`: that of its job; it names the axis only if it is the one that was swept.
     """
     from service.jobs.drawing import response_of
     from solver.views.plots import style
@@ -179,11 +175,8 @@ def sweep_dataset(
 ) -> Dataset:
     """A stored sweep, a point a row.
 
-    Sweeps that an earlier version stored have no column `residual` and none of the states.
-
-    Parameters
-    ----------
-    scene : that of its job; it is told only if it is the one that was swept.
+    Sweeps that an earlier version stored have no column `residual` and none of the states. `scene`: that of
+    its job; it is told only if it is the one that was swept.
     """
     arrays = {name: stored.array() for name, stored in repository.arrays(row.id).items()}
     names = [contact.name for contact in row.contacts]

@@ -68,11 +68,7 @@ def resolved_structure(
     """The tables of a structure with the files it names, in `folder`, replaced by what they hold.
 
     InvalidRequestError with pointers into the scene; UnreadableUploadError if a file cannot be read, or
-    reading takes too much.
-
-    Parameters
-    ----------
-    orders : engine orders of the excitation, for which a sector is reduced.
+    reading takes too much. `orders`: engine orders of the excitation, for which a sector is reduced.
     """
     scene = {"structure": dict(structure), "excitation": [{"engine_order": order} for order in orders]}
     found: dict[str, Any] = _ask(_RESOLVE, folder, scene, seconds, most_bytes)

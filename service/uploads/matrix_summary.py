@@ -34,12 +34,8 @@ _SHOWN = 10
 def look(asked: Mapping[str, Any]) -> dict[str, Any]:
     """What the files of a structure hold; with its DOFs also the scene, and what its structure resolves to.
 
-    SceneError with pointers into the scene that is asked for.
-
-    Parameters
-    ----------
-    asked : `files` or `structure` (whose keys name files of the working directory), and for a scene `name`,
-        `contacts`, `excitation` and `observe`.
+    SceneError with pointers into the scene that is asked for. `asked`: `files` or `structure` (whose keys
+    name files of the working directory), and for a scene `name`, `contacts`, `excitation` and `observe`.
     """
     from solver.matrices.load_set import MatrixSet
     from solver.matrices.matrix_files import read_modes
@@ -361,11 +357,7 @@ def kept_sector(
     """The tables of a sector as a scene keeps them, and the reduction if they ask for one.
 
     SceneError for a model too large as it stands, boundaries that do not match, or anything else that cannot
-    be used.
-
-    Parameters
-    ----------
-    rows : of its matrices; None for a reduced one.
+    be used. `rows`: of its matrices; None for a reduced one.
     """
     from solver.matrices.scene_files import sector_with_files
     from solver.matrices.sectors.loading import MOST_SECTORS

@@ -121,9 +121,7 @@ def dof_table(
 ) -> dict[str, int | str]:
     """Names of DOFs, each with its row or label; all rows of a small model if none is named.
 
-    Parameters
-    ----------
-    patches : whether patches name DOFs too, so that none need be named here.
+    `patches` says whether patches name DOFs too, so that none need be named here.
     """
     if not texts:
         return {} if patches else _all_rows(found, given)

@@ -86,9 +86,7 @@ def _option(one: Option) -> Any:
 def takes_problem(keys: Mapping[str, Option]) -> Callable[[Command], Command]:
     """Give a command the options of a design problem in place of its `flags`.
 
-    Parameters
-    ----------
-    keys : key to its option, of those that the problem has.
+    `keys`: key to its option, of those that the problem has.
     """
     given_as: dict[str, Any] = {
         "problem": File, **{name: _option(one) for name, one in keys.items()}, "values": parameters.Values,

@@ -179,11 +179,7 @@ def check(url: str, arrays: str | None = None) -> Findings:
     """Read a database from end to end; a service may be using it.
 
     DatabaseError if there is no such database; DamagedDatabaseError, WrongRevisionError if it cannot be read,
-    or it is at another revision.
-
-    Parameters
-    ----------
-    arrays : where large arrays are, if that is outside of the database.
+    or it is at another revision. `arrays`: where large arrays are, if that is outside of the database.
     """
     name = database_name(url)
     if is_sqlite(url) and not database_path(url).exists():

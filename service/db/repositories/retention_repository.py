@@ -72,9 +72,7 @@ class RetentionRepository:
     def take(self, before: datetime, most: int, *, keep_designs: bool, binned: bool = False) -> list[str]:
         """Take up to `most` old jobs out of the store of results; their ids, oldest first.
 
-        Parameters
-        ----------
-        binned : those that were put in the bin before the time, in place of those that ended before it.
+        `binned`: those that were put in the bin before the time, in place of those that ended before it.
         """
         old = _binned(before) if binned else _old(before, keep_designs=keep_designs)
         query = select(Job.id).where(old).order_by(Job.id).limit(most)

@@ -404,11 +404,7 @@ class Shares(Rows[Share]):
         """Make a link to a run.
 
         NotFoundError, ConflictError, StorageFullError if there is no such run, it is in the bin, it has
-        `most` links.
-
-        Parameters
-        ----------
-        days : after which it ends; None for never.
+        `most` links. `days`: after which it ends; None for never.
         """
         self._runs.outside(job_id, sees)
         share_id, token = _TOKENS.new()

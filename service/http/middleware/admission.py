@@ -34,9 +34,7 @@ _UPLOAD = "/v1/uploads"
 class ConcurrencyLimits:
     """Counts requests while they are answered.
 
-    Parameters
-    ----------
-    settings : the limits, of keys that have none of their own.
+    `settings` is the limits, of keys that have none of their own.
     """
 
     def __init__(self, settings: Settings) -> None:

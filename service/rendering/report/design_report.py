@@ -49,11 +49,8 @@ _MOST_PARAMETERS = 8
 def design_report(given: Designed) -> str:
     """The report as a page of HTML.
 
-    SettingError, SceneError if the optimum does not fit the scene.
-
-    Parameters
-    ----------
-    given : what was designed: the result of a design, or of a front.
+    SettingError, SceneError if the optimum does not fit the scene. `given`: what was designed: the result of
+    a design, or of a front.
     """
     chosen = _chosen(given.result)
     optimum = by_path(chosen["optimum"])
@@ -143,11 +140,8 @@ _COLORS = {"nominal": style.SKY, "robust": style.VERMILION}
 def robust_report(given: Designed) -> str:
     """The report as a page of HTML.
 
-    SettingError, SceneError if the optimum does not fit the scene.
-
-    Parameters
-    ----------
-    given : what was designed; its result is that of `optim.robust_design`.
+    SettingError, SceneError if the optimum does not fit the scene. `given`: what was designed; its result is
+    that of `optim.robust_design`.
     """
     found = given.result
     optimum = by_path(found["optimum"])
@@ -253,9 +247,7 @@ _MOST_CANDIDATES = 10
 def identification_report(given: Designed) -> str:
     """The report as a page of HTML.
 
-    Parameters
-    ----------
-    given : what was measured, with its values as they were given, and what was found.
+    `given` is what was measured, with its values as they were given, and what was found.
     """
     scene, found = given.scene, given.result
     name = f"Parameters of {scene.name} from measurements"
