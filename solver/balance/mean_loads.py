@@ -19,6 +19,7 @@ from solver.balance.kernels.residual import contact_values
 from solver.contacts.kernels.columns import N0, PRESTRESSED
 from solver.contacts.kernels.system import Receptance, System, receptance_by_value
 from solver.contacts.laws.contact_parts import Slider
+from solver.contacts.pieces.line import values_at
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
@@ -149,4 +150,4 @@ def _least(load: Real) -> float:
 
 def _open(load: Real) -> Real:
     tau = np.asarray(2.0 * math.pi / _INSTANTS * (np.arange(_INSTANTS) + 0.5), np.float64)
-    return np.maximum(fourier.basis(tau, (load.size - 1) // 2) @ load, 0.0)
+    return np.maximum(values_at(load, tau), 0.0)

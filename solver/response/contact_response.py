@@ -13,6 +13,7 @@ import numpy as np
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import CLOSED, DEFORMING, TOUCHING
 from solver.contacts.kernels.stick_slip_events import LIFTING, SEPARATED, SLIPPING, STUCK
+from solver.contacts.pieces.line import values_at
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED
@@ -108,7 +109,7 @@ class ContactResponse(Piece):
         its force, which is then the sum of the harmonics kept.
         """
         if given.is_rigid:
-            return np.asarray(fourier.basis(tau, (self.force.size - 1) // 2) @ self.force)
+            return values_at(self.force, tau)
         return given.force_at(np.array(self.motions), self.load, tau)
 
 

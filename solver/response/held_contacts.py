@@ -20,8 +20,8 @@ from typing import Annotated
 import numpy as np
 
 from solver.contacts.laws.contact_parts import Slider
+from solver.contacts.pieces.line import values_at
 from solver.errors import SettingError
-from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
 from solver.linear.condensation import CANCELLED_STIFFNESS
@@ -55,13 +55,11 @@ class HeldContact:
 
     def forces(self, tau: Real) -> Real:
         """Return the friction force [N], (directions, n)."""
-        parts = [self.found.forces[port] for port in self.given.ports]
-        return np.array([fourier.basis(tau, (part.size - 1) // 2) @ part for part in parts])
+        return values_at(np.array([self.found.forces[port] for port in self.given.ports]), tau)
 
     def limit(self, tau: Real) -> Real:
         """Return μN [N], (n,)."""
-        load = self.found.load
-        return np.asarray(self.given.limit(fourier.basis(tau, (load.size - 1) // 2) @ load))
+        return self.given.limit(values_at(self.found.load, tau))
 
     def lost(self, moved: Real) -> float:
         """Return the most that motions of all ports up to `moved` [m] take of the room to the limit [N]."""

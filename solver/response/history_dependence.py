@@ -46,7 +46,7 @@ import numpy as np
 
 from solver.balance.workspace import Workspace
 from solver.contacts.laws.contact_parts import Slider
-from solver.jit import fourier
+from solver.contacts.pieces.line import values_at
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
 from solver.linear.model import LinearModel
@@ -371,7 +371,7 @@ def _in_sliders(solution: Solution, model: LinearModel, sticking: tuple[HeldCont
         for slider in () if contact.friction is None else contact.friction.limited:
             if slider in held:
                 continue
-            load = fourier.basis(angles, (response.load.size - 1) // 2) @ response.load
+            load = values_at(response.load, angles)
             squares = slider.limit(np.maximum(load, 0.0)) ** 2
             if len(slider.ports) == 1:
                 along = contact.friction_at(np.array(response.motions), response.load, angles)

@@ -26,6 +26,7 @@ from solver.balance.kernels.haigh import STATIC, utilisation
 from solver.balance.kernels.output import extremes
 from solver.balance.workspace import PointSolution, Workspace
 from solver.contacts.kernels.columns import MU
+from solver.contacts.pieces.line import values_at
 from solver.continuation.bracketing import least_between
 from solver.continuation.branch import Branch, Peak
 from solver.errors import SettingError
@@ -328,6 +329,5 @@ class WorstMeanSlopes(Sensitivities):
         """Return the derivatives of μN of a contact at an instant by the paths, (n_paths,)."""
         load, by = held.found.load, self._loads[:, held.number]
         at = np.array([tau])
-        N = float(fourier.basis(at, (load.size - 1) // 2)[0] @ load)
-        dN = by @ fourier.basis(at, (by.shape[1] - 1) // 2)[0]
+        N, dN = float(values_at(load, at)[0]), values_at(by, at)[:, 0]
         return np.asarray(self._slopes[:, held.number, MU] * N + held.given.limit(dN))

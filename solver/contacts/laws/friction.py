@@ -347,13 +347,11 @@ class FrictionContact(AnyContact):
 
     def utilisation(self, forces: Real, load: Real) -> float:
         """Return the largest share of its limit that it carries while it sticks."""
-        from solver.jit import fourier
+        from solver.contacts.pieces.line import values_at
 
-        n = forces.shape[1]
-        tau = np.linspace(0.0, 2.0 * np.pi, max(360, 8 * n), endpoint=False)
-        limit = self.friction.limit(fourier.basis(tau, (load.size - 1) // 2) @ load)
-        along = forces[list(self.RUBBING)] @ fourier.basis(tau, (n - 1) // 2).T
-        carried = self.friction.size(along)
+        tau = np.linspace(0.0, 2.0 * np.pi, max(360, 8 * forces.shape[1]), endpoint=False)
+        limit = self.friction.limit(values_at(load, tau))
+        carried = self.friction.size(values_at(forces[list(self.RUBBING)], tau))
         with np.errstate(divide="ignore", invalid="ignore"):
             shares = np.where(carried > 0.0, carried / limit, 0.0)
         return float(min(shares.max(), 1.0))

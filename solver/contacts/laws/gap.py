@@ -62,11 +62,10 @@ class GapSpring(AnyContact):
 
     def force_at(self, motions: Real, load: Real, tau: Real) -> Real:
         """Return the force along the first motion [N] at the angles `tau`."""
-        from solver.jit import fourier
+        from solver.contacts.pieces.line import values_at
 
         del load
-        u = fourier.basis(tau, (motions.shape[1] - 1) // 2) @ motions[0]
-        return np.asarray(self.k * np.maximum(u - self.gap, 0.0))
+        return np.asarray(self.k * np.maximum(values_at(motions[0], tau) - self.gap, 0.0))
 
     def motion_at(self, motions: Real, load: Real, force: Real, tau: Real) -> list[ContactMotion]:
         """Return what it does at every angle: it is closed where it pushes."""

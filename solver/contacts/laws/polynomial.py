@@ -109,11 +109,10 @@ class PolynomialSpring(AnyContact):
 
     def force_at(self, motions: Real, load: Real, tau: Real) -> Real:
         """Return the force along the first motion [N] at the angles `tau`."""
-        from solver.jit import fourier
+        from solver.contacts.pieces.line import values_at
 
         del load
-        u = fourier.basis(tau, (motions.shape[1] - 1) // 2) @ motions[0]
-        return np.asarray(np.polyval([*self.coefficients[::-1], 0.0], u))
+        return np.asarray(np.polyval([*self.coefficients[::-1], 0.0], values_at(motions[0], tau)))
 
     def perturbed(self, motions: Real, load: Real) -> tuple[ContactPart, ...]:
         """Return how it follows small perturbations of a motion."""

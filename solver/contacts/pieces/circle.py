@@ -33,7 +33,7 @@ from solver.contacts.kernels.circle.panels import between
 from solver.contacts.kernels.columns import COLUMNS, KT, KT_SECOND, MU
 from solver.contacts.kernels.stick_slip_events import FAILED, SEPARATED, SLIP
 from solver.contacts.laws.contact_parts import Slider
-from solver.contacts.pieces.line import Shares, gap_pieces
+from solver.contacts.pieces.line import Shares, gap_pieces, values_at
 from solver.contacts.pieces.piece import SHORTEST, TURN, Rates, StateEntry, StatePiece, spring, steady
 from solver.errors import SettingError
 from solver.jit import fourier
@@ -109,9 +109,9 @@ def force_in_space(path: SpacePath, tau: Real) -> Real:
         here = piece.begin + since[inside]
         if piece.motion == SLIP:
             way, _ = _ways(directions(path, piece, here))
-            force[:, inside] = path.slider.limit(_at(path.load[None], here)) * way.T
+            force[:, inside] = path.slider.limit(values_at(path.load, here)) * way.T
         else:
-            moved = _at(path.motions, here) - _at(path.motions, np.array([piece.begin]))
+            moved = values_at(path.motions, here) - values_at(path.motions, np.array([piece.begin]))
             force[:, inside] = np.array([[piece.tx], [piece.ty]]) + path.slider.pull(moved)
     return force
 
@@ -128,11 +128,6 @@ def directions(path: SpacePath, piece: Row, tau: Real) -> Real:
     return found
 
 
-def _at(coefficients: Real, tau: Real) -> Real:
-    """Return the values of rows of full coefficients at the angles `tau`, (rows, n)."""
-    return np.asarray(coefficients @ fourier.basis(tau, (coefficients.shape[1] - 1) // 2).T)
-
-
 class _Motion:
     """The motion of a contact at an angle: rates of both directions, limit and its rate, direction."""
 
@@ -143,12 +138,12 @@ class _Motion:
         curves[:2, : path.motions.shape[1]] = fourier.derivative(path.motions)
         curves[2, : path.load.size] = path.slider.limit(path.load)
         curves[3, : path.load.size] = path.slider.limit(fourier.derivative(path.load))
-        self._curves, self._highest = curves, highest
+        self._curves = curves
 
     def at(self, tau: Real) -> tuple[Real, Real, Real]:
         """Return u' (t, 2) [m], L and L' (t,) [N]."""
-        here = fourier.basis(tau, self._highest) @ self._curves.T
-        return here[:, :2], here[:, 2], here[:, 3]
+        here = values_at(self._curves, tau)
+        return here[:2].T, here[2], here[3]
 
     def direction(self, piece: Row, tau: Real) -> Real:
         """Return θ in a slip at any angles (t,)."""

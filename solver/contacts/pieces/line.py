@@ -128,11 +128,11 @@ def force_by_segments(slider: Slider, slip: Real, load: Real, tau: Real) -> Real
     force, limit = np.zeros(tau.size), slider.limit(load)
     for row in segments_of(slider, slip, load).rows:
         inside, onset = _inside(row, tau), np.array([row.onset])
-        held = np.zeros(1) if row.began == UNLOADED else _at(slip, onset)
+        held = np.zeros(1) if row.began == UNLOADED else values_at(slip, onset)
         if row.began == AFTER_SLIP:
-            held = line_left(row.direction, slider.kt, held, _at(limit, onset))
+            held = line_left(row.direction, slider.kt, held, values_at(limit, onset))
         here = tau[inside]
-        force[inside] = line_force(_does(row), slider.kt, _at(slip, here), held, _at(limit, here))
+        force[inside] = line_force(_does(row), slider.kt, values_at(slip, here), held, values_at(limit, here))
     return force
 
 
@@ -197,13 +197,14 @@ def _presses_or_opens(load: Real) -> None:
         raise SettingError("solution", "motion", wanted)
 
 
-def _at(coefficients: Real, tau: Real) -> Real:
-    return np.asarray(fourier.basis(tau, (coefficients.size - 1) // 2) @ coefficients)
+def values_at(coefficients: Real, tau: Real) -> Real:
+    """Return the values (..., t) of full coefficients (..., 2H + 1) at angles (t,)."""
+    return np.asarray(coefficients @ fourier.basis(tau, (coefficients.shape[-1] - 1) // 2).T)
 
 
 def _slope(coefficients: Real, tau: float) -> float:
     """Return the derivative by τ of full coefficients."""
-    return float(_at(fourier.derivative(coefficients), np.array([tau]))[0])
+    return float(values_at(fourier.derivative(coefficients), np.array([tau]))[0])
 
 
 def gap_pieces(motion: Real, stiffness: float, gap: float) -> tuple[StatePiece, ...]:
@@ -218,10 +219,9 @@ def polynomial_pieces(motion: Real, powers: tuple[float, ...]) -> tuple[StatePie
     slopes = [j * a for j, a in enumerate(powers, start=1)]
     if not any(slopes[1:]):
         return (spring(0.0, TURN, np.array([[slopes[0]]])),)
-    highest = (motion.size - 1) // 2
 
     def rates(tau: Real) -> Rates:
-        u = fourier.basis(tau, highest) @ motion
+        u = values_at(motion, tau)
         stiffness = np.asarray(np.polynomial.polynomial.polyval(u, slopes), dtype=np.float64)
         none = np.zeros((len(tau), 0, 1))
         return Rates(stiffness[:, None, None], none.swapaxes(1, 2), none, none, none[:, :, :0])

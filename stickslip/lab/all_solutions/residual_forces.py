@@ -16,6 +16,7 @@ from typing import Annotated
 
 import numpy as np
 
+from solver.contacts.pieces.line import values_at
 from solver.balance.balance import build
 from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, MEAN
 from solver.balance.simplifications import Effects
@@ -203,8 +204,6 @@ class _Search:
                 return False
             carried = np.array([response.forces[port] for port in given.ports])
             carried[:, 0] += [s for s, (j, _) in zip(forces, self._sliding, strict=True) if j == i]
-            basis = fourier.basis(tau, (carried.shape[1] - 1) // 2)
-            limit = given.limit(fourier.basis(tau, (response.load.size - 1) // 2) @ response.load)
-            if np.any(given.size(carried @ basis.T) > limit):
+            if np.any(given.size(values_at(carried, tau)) > given.limit(values_at(response.load, tau))):
                 return False
         return True

@@ -307,13 +307,13 @@ def _room(contact: AnyContact, motions: Real, left: float, sign: float) -> tuple
         return math.inf, np.zeros(len(motions) - 1)
     load = contact.normal_load(motions[0])
     room = np.zeros(max(load.size, motions.shape[-1]))
-    room[: load.size] += slider.mu * load
+    room[: load.size] += slider.limit(load)
     room[: motions.shape[-1]] -= sign * slider.kt * motions[0, slider.ports[0]]
     room[0] -= sign * left
     at = fourier.basis(np.array([lowest(room)]), (room.size - 1) // 2)[0]
     moved = -sign * slider.kt * motions[1:, slider.ports[0]]
     if slider.normal_port is not None:
-        moved = moved + slider.mu * slider.normal_stiffness * motions[1:, slider.normal_port]
+        moved = moved + slider.limit_rise * motions[1:, slider.normal_port]
     return float(at @ room), np.asarray(moved @ at[: motions.shape[-1]])
 
 
@@ -326,4 +326,4 @@ def _limit(scene: Scene, i: int) -> float:
     slider, load = scene.contacts[i].friction, scene.contacts[i].load
     if slider is None or load is None:
         return 1.0
-    return slider.mu * float(np.abs(load.coefficients).sum()) or 1.0
+    return slider.limit(float(np.abs(load.coefficients).sum())) or 1.0
