@@ -91,7 +91,7 @@ def test_machines_whose_clocks_disagree_leave_each_other_their_jobs(
         second = Service(make(workers=1, lease_seconds=5.0, poll_seconds=0.1), PRIVATE)
         second.start()
         try:
-            jobs = [first.submit({"kind": "iteration", "seconds": 1.5, "seed": n})[0].id for n in range(4)]
+            jobs = [first.submit({"kind": "iteration", "seconds": 0.7, "seed": n})[0].id for n in range(4)]
             until(lambda: all(first.job(job).state.finished for job in jobs))
             assert [first.job(job).attempt for job in jobs] == [1] * 4
         finally:

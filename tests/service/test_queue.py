@@ -219,7 +219,7 @@ def test_stopping_gives_running_jobs_back_without_an_attempt(
     make_settings: MakeSettings, tmp_path: Path
 ) -> None:
     file = tmp_path / "pids"
-    spec = {"seconds": 2.0, "pid_file": str(file)}
+    spec = {"seconds": 1.0, "pid_file": str(file)}
     with EmbeddedService(make_settings(), PRIVATE) as service:
         jobs = [service.submit(kind, spec) for kind in ("deaf", "iteration")]
         until(lambda: pids(file))
