@@ -11,10 +11,10 @@ not hold: a part that vibrates may creep under less.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.balance.balance import Balance
 from solver.balance.kernels.residual import contact_values
 from solver.contacts.kernels.columns import N0, PRESTRESSED
 from solver.contacts.kernels.system import Receptance, System, receptance_by_value
@@ -23,6 +23,9 @@ from solver.contacts.pieces.line import values_at
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
+
+if TYPE_CHECKING:
+    from solver.balance.balance import Balance
 
 SIDES = 64  # of the polygon round a circular limit, 0.1 % larger
 _INSTANTS = 720  # of a period, for the mean of a load that opens the contact

@@ -166,7 +166,9 @@ class _Drifting:
 
     def _left(self, drift: Real) -> Real:
         """Return the mean force (g,) that drives the held motion on beside a drift [N]."""
-        return -self._along(self._residual(self.start, drift, slopes=False)[0])
+        balance = self.workspace.balance
+        means = self._residual(self.start, drift, slopes=False)[0][:: balance.n_coefficients]
+        return np.asarray(-self.ways @ (balance.system.shift * means))
 
     def solved(self, drift: Real) -> Real | None:
         """Return the drift in a period by each way (g,), by Newton's method from there; None: not found."""
@@ -200,22 +202,11 @@ class _Drifting:
             return None
         return step if np.all(np.isfinite(step)) else None
 
-    def _along(self, residual: Real) -> Real:
-        """Return the mean forces that a residual leaves along the ways (g,) [N]."""
-        means = residual[:: self.workspace.balance.n_coefficients]
-        return np.asarray(self.ways @ (self.workspace.balance.system.shift * means))
-
     def _norm(self, residual: Real) -> float:
         """Return a residual relative to the forces of the contacts on their stiffnesses."""
-        ports = self.workspace.balance.n_ports
-        left = self.workspace.balance.system.shift[:, None] * np.abs(residual.reshape(ports, -1))
-        return float(left.max() / max(self._size, 1e-300))
-
-    @property
-    def _size(self) -> float:
-        """The largest force that acts [N]."""
-        shift, ports = self.workspace.balance.system.shift, self.workspace.balance.n_ports
-        return float((shift[:, None] * np.abs(self.free.reshape(ports, -1))).max())
+        shift, ports = self.workspace.balance.system.shift[:, None], self.workspace.balance.n_ports
+        left, acts = (float((shift * np.abs(x.reshape(ports, -1))).max()) for x in (residual, self.free))
+        return left / max(acts, 1e-300)
 
     def _residual(self, u: Real, drift: Real, *, slopes: bool = True) -> tuple[Real, Real, Real]:
         """Return the residual (m,) at a motion and drift with its slopes (m, m) by u and (m, g) by drift."""

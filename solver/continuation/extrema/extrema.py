@@ -198,7 +198,10 @@ class Survey:
                 changes = ChangeSearch(self._solver, self._worth)
                 self._nodes = changes.run(self._nodes)
                 self._undone += changes.left
-            self._look_for_resonances()
+            if len(self._nodes) > 1 and ClosedLoop.serves(solver.workspace.balance):
+                competes = self._worth if highest_alone else 0.0
+                self._search = ResonanceSearch(self._solver, competes).run(self._nodes)
+                self._nodes = self._search.nodes
             self._densify()
             self._find_peaks()
 
@@ -247,13 +250,6 @@ class Survey:
             # There cubics are known to be right to their share of it.
             bound = max(bound, top * (1.0 + PREDICTED))
         return certified(bound=bound, gap=gap, resonances=self._search.solved)
-
-    def _look_for_resonances(self) -> None:
-        balance = self._workspace.balance
-        if ClosedLoop.serves(balance) and len(self._nodes) > 1:
-            competes = self._worth if self._highest_alone else 0.0
-            self._search = ResonanceSearch(self._solver, competes).run(self._nodes)
-            self._nodes = self._search.nodes
 
     def _part_changes(self) -> None:
         """Halve long intervals in which contacts change and the amplitude is not far from the top.
@@ -309,8 +305,13 @@ class Survey:
             if not waving.any():
                 break
             dense, _, _ = self._solver.halved(dense, waving)
-        self._least, refined, begun = self._worth * top, list[PointRow](), 0
-        for j, inside in sorted(self._maxima(dense, top).items()):
+        self._least, refined, begun, found = self._worth * top, list[PointRow](), 0, {}
+        if len(dense) > 1:  # where the highest may stand is polished first
+            seen = self._solver.look(dense, top)
+            falls = np.any((seen.slopes[:, 0] > 0.0) & (seen.slopes[:, 1] <= 0.0), axis=1)
+            for j in sorted(np.flatnonzero(falls).tolist(), key=lambda j: -float(seen.reach[j])):
+                found[j] = self._peaks_between(dense[j], dense[j + 1], seen.slopes[j].tolist(), top)
+        for j, inside in sorted(found.items()):
             refined += [*dense[begun : j + 1], *inside]
             begun = j + 1
         self._nodes = [*refined, *dense[begun:]]
@@ -319,15 +320,6 @@ class Survey:
             self._peaks.append(self._peak(first, interior=False))
         if len(self._nodes) > 1 and _slope(last) >= 0.0:
             self._peaks.append(self._peak(last, interior=False))
-
-    def _maxima(self, nodes: list[PointRow], top: float) -> dict[int, list[PointRow]]:
-        """Collect the maxima between nodes, where the highest may stand first; return them by interval."""
-        if len(nodes) < 2:
-            return {}
-        seen = self._solver.look(nodes, top)
-        falls = np.any((seen.slopes[:, 0] > 0.0) & (seen.slopes[:, 1] <= 0.0), axis=1)
-        places = sorted(np.flatnonzero(falls).tolist(), key=lambda j: -float(seen.reach[j]))
-        return {j: self._peaks_between(nodes[j], nodes[j + 1], seen.slopes[j].tolist(), top) for j in places}
 
     def _peaks_between(
         self, left: PointRow, right: PointRow, slopes: list[list[float]], top: float

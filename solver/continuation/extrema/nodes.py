@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise, product
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,8 +45,6 @@ from solver.scene.scene_harmonics import Amplitudes
 if TYPE_CHECKING:
     from solver.balance.workspace import Workspace
     from solver.continuation.extrema.resonance_search import Resonance
-
-_Number = TypeVar("_Number", np.float64, np.int64)
 
 _UNKNOWN = -2  # row of a node whose stiffness was not asked for
 
@@ -95,27 +93,17 @@ class NodeTable:
         """Add rows, one a row or a single one; return the number of the first."""
         first = self._count
         count = 1 if solutions.ndim == 1 else len(solutions)
+        more = first + count + (first + count) // 2 + 16 - len(self.partners)
         if first + count > len(self.partners):
-            self._grow(first + count)
+            for name in (*ROWS, "partners", "scales"):
+                array = getattr(self, name)
+                room = np.empty((more, *array.shape[1:]), array.dtype)
+                setattr(self, name, np.concatenate([array, room]))
         rows = slice(first, first + count)
         self.solutions[rows], self.tangents[rows], self.measures[rows] = solutions, tangents, measures
         self.observed[rows], self.states[rows], self.partners[rows] = observed, states, -1
         self._count += count
         return first
-
-    def _grow(self, needed: int) -> None:
-        size = needed + needed // 2 + 16
-        self.solutions, self.tangents = _longer(self.solutions, size), _longer(self.tangents, size)
-        self.measures, self.observed = _longer(self.measures, size), _longer(self.observed, size)
-        self.states, self.scales = _longer(self.states, size), _longer(self.scales, size)
-        self.partners = _longer(self.partners, size)
-
-
-def _longer(array: NDArray[_Number], size: int) -> NDArray[_Number]:
-    """Return an array with room for more rows."""
-    longer = np.empty((size, *array.shape[1:]), array.dtype)
-    longer[: len(array)] = array
-    return longer
 
 
 @dataclass(frozen=True, slots=True, eq=False)

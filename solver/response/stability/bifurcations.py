@@ -224,8 +224,14 @@ def switch_branches(
     if not isinstance(branch, Branch):
         raise SettingError("branches", branch.scene.name, _ORBITS)
     found = bifurcations(branch).marks if marks is None else marks
-    points = [mark for mark in found if mark.kind is MarkKind.BRANCH_POINT]
-    return tuple(_switched(branch, mark, settings) for mark in points)
+    inside, switched = branch.balance.parameter.inside, list[Switched]()
+    span = abs(inside(branch.stop) - inside(branch.start))
+    for mark in found:
+        if mark.kind is MarkKind.BRANCH_POINT:
+            other = leaving(branch.balance, mark, branch.tangents[mark.after], span)
+            followed = tuple(_followed(branch, beside, mark.solution, settings) for beside in other.beside)
+            switched.append(Switched(mark=mark, tangents=other.tangents, branches=followed))
+    return tuple(switched)
 
 
 class _Scaled:
@@ -291,14 +297,6 @@ def leaving(balance: Balance, mark: Mark, tangent: Real, span: float) -> Leaving
             ways.append(way / np.linalg.norm(way))
             found.append(beside)
     return Leaving(np.array([tangent, ways[0] if ways else across]), tuple(found))
-
-
-def _switched(branch: Branch, mark: Mark, settings: ContinuationSettings | None) -> Switched:
-    inside = branch.balance.parameter.inside
-    span = abs(inside(branch.stop) - inside(branch.start))
-    found = leaving(branch.balance, mark, branch.tangents[mark.after], span)
-    followed = tuple(_followed(branch, beside, mark.solution, settings) for beside in found.beside)
-    return Switched(mark=mark, tangents=found.tangents, branches=followed)
 
 
 def _followed(branch: Branch, beside: Real, place: Real, settings: ContinuationSettings | None) -> Branch:

@@ -453,14 +453,14 @@ class _Flow:
 
     def remembered(self) -> list[int]:
         """Return the places in z of what is remembered now."""
-        return [int(self.first[i]) + k for i in range(len(self.elements)) for k in range(self._memory(i))]
+        present = ((i, at) for i, at in enumerate(self.active) if at >= 0)
+        return [
+            int(self.first[i]) + k for i, at in present for k in range(self.elements[i].pieces[at].memory)
+        ]
 
     def owner(self, place: int) -> int:
         """Return the element that a place in z belongs to."""
         return int(np.searchsorted(self.first, place, side="right")) - 1
-
-    def _memory(self, i: int) -> int:
-        return 0 if self.active[i] < 0 else self.elements[i].pieces[self.active[i]].memory
 
     def entered(self, tau: float, state: Real) -> Real:
         """Return the state with every element in the piece that lasts at an angle."""
