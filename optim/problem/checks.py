@@ -159,11 +159,11 @@ def whole(name: str | Place, value: object, *, least: int, most: int | None = No
     DesignError
         Anything else; `more` says what it is.
     """
-    good = isinstance(value, Integral) and not isinstance(value, bool) and value >= least
-    if not good or (most is not None and value > most):
+    found = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else None
+    if found is None or found < least or (most is not None and found > most):
         wanted = f">= {least}" if most is None else f"from {least} to {most}"
         raise DesignError(name, value, f"must be a whole number {wanted}{more}")
-    return int(value)
+    return found
 
 
 def positive(name: str | Place, value: object) -> float:

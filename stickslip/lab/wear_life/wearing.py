@@ -25,7 +25,6 @@ from solver.scene.scene import AnyContact, Scene
 from solver.scene.scene_parameter import changed
 
 LOAD, STIFFNESS = "N0", "kt"
-OF_COEFFICIENT = "coefficient"
 SECONDS_AN_HOUR = 3600.0
 
 PerContact = float | Mapping[str, float]
