@@ -108,7 +108,9 @@ def whole_motion(
     numpy.linalg.LinAlgError
         Z is singular.
     """
-    ks, given = system.ks.astype(np.float64), _levels(system, omega)
+    ks = system.ks.astype(np.float64)
+    levels = system.level[np.where((system.ks == 0) & bool(system.constant_mean), 1, 0)]
+    given = (levels @ omega ** np.arange(3))[:, None]  # 1 but along an engine-order line
     measured = ((system.only < 0) | (system.ks == system.only))[:, None]
     if matrices is None and system.form == DENSE:
         which = system.which
@@ -135,12 +137,6 @@ def whole_motion(
         contact=system.contact_modes[which], back=system.contact_duals[which],
         observe=measured * system.observe_modes[which], forces=given * system.modal_forces,
     )  # fmt: skip
-
-
-def _levels(system: System, omega: float) -> Real:
-    """Return the factor of the forces of each harmonic at ω, (nk, 1): 1 but along an engine-order line."""
-    rows = np.where((system.ks == 0) & bool(system.constant_mean), 1, 0)
-    return np.asarray(system.level[rows] @ omega ** np.arange(3))[:, None]
 
 
 def _of_matrices(matrices: HarmonicMatrices, k: Real, omega: float) -> WholeMotion:

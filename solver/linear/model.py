@@ -423,8 +423,3 @@ class LinearModelDerivative(Terms):
     forces: Annotated[tuple[ForceTerm, ...], "First derivatives of the forces [N per unit]."] = ()
     second_forces: Annotated[tuple[ForceTerm, ...], "Second ones [N per unit squared]."] = ()
     second_extra: Annotated[ExtraTerms | None, "Second derivatives of the extra terms."] = None
-
-    @property
-    def by_loss_factor(self) -> bool:
-        """Whether the parameter is the loss factor, so that dK is i times the stiffness of the model."""
-        return self.extra is not None and self.extra.lossy is not None

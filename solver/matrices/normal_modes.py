@@ -50,7 +50,9 @@ def undamped_modes(K: NDArray[Any], M: NDArray[Any]) -> UndampedModes:
     numpy.linalg.LinAlgError
         The mass matrix is not positive definite.
     """
-    sigma = 0.0 if _definite(K) else SHIFT * float(np.max(np.abs(np.diag(K)) / np.diag(M).real, initial=0.0))
+    # Whatever the units of the rows are, with room to spare.
+    definite = least_stiffness(K) > SMALL_PIVOT
+    sigma = 0.0 if definite else SHIFT * float(np.max(np.abs(np.diag(K)) / np.diag(M).real, initial=0.0))
     try:
         found, psi = eigen.pencil(M, K + sigma * M if sigma else K)
     except np.linalg.LinAlgError:
@@ -61,11 +63,6 @@ def undamped_modes(K: NDArray[Any], M: NDArray[Any]) -> UndampedModes:
         return UndampedModes(flexibility=found, psi=phi * np.sqrt(found), sigma=sigma)
     found, psi = np.maximum(found[::-1], LEAST * found[-1]), np.ascontiguousarray(psi[:, ::-1])
     return UndampedModes(flexibility=found, psi=psi, sigma=sigma)
-
-
-def _definite(K: NDArray[Any]) -> bool:
-    """Return whether K is positive definite, whatever the units of its rows, with room to spare."""
-    return least_stiffness(K) > SMALL_PIVOT
 
 
 def hermitian(K: NDArray[Any]) -> NDArray[Any]:

@@ -37,7 +37,7 @@ class MapStatus(Enum):
 class ResponseMap(MadeOfResponses, Drawn):
     """max|x| of the observed DOF over a parameter and the frequency."""
 
-    VIEWS: ClassVar = Views("solver.views", "tracks:response_map", "of_map")
+    VIEWS: ClassVar = Views("solver.views", "tracks:response_map", "tracks:map_figure")
     DATA: ClassVar = Data(
         "map", {"parameter": "parameter", "frequency": "frequency",
         "parameter frequency": "amplitude half_peak_to_peak", "ridge": "ridge_parameter=ridge.parameter"

@@ -174,7 +174,7 @@ class CompetingPeak(Piece):
 class PeakTrack(MadeOfResponses, Drawn):
     """The highest peak over a parameter; where two peaks change places both are listed."""
 
-    VIEWS: ClassVar = Views("solver.views", "tracks:track", "of_track")
+    VIEWS: ClassVar = Views("solver.views", "tracks:track", "tracks:track_figure")
     DATA: ClassVar = Data(
         "peaks", {"point": "parameter peak frequency slope"},
         "parameter=parameter_path harmonics=n_harmonics least_at=optimum.at least_peak=optimum.peak",

@@ -14,17 +14,15 @@ from solver.response.stability.multipliers import Stability
 from solver.results.measures import Measured
 from solver.scene.scene import Scene
 from solver.studies.blades import BladeAmplitudes, BladePeaks
-from solver.studies.peaks.track_results import PeakTrack
 from solver.views.plots.curves import Response
 from solver.views.plots.disks import blades_figure
 from solver.views.plots.modes import performance_figure
 from solver.views.plots.motion import Motion, motion_figure, multipliers_figure
 from solver.views.plots.responses import Demands, response_figure
 from solver.views.plots.style import Into
-from solver.views.plots.tracks import map_figure, track_figure
 
 if TYPE_CHECKING:
-    from solver.studies.study_results import ResponseMap
+    pass
 
 
 def of_branch(branch: AnyBranch, ax: Into = None, *, limit: float | None = None) -> Figure:
@@ -42,16 +40,6 @@ def of_march(march: MarchResult, ax: Into = None, *, scene: Scene | None = None)
     if scene is None:
         return motion_figure(Motion.of_march(march), ax=ax)
     return motion_figure(Motion.of_march(march, scene.name, scene.observe.dof), ax=ax)
-
-
-def of_track(track: PeakTrack, ax: Into = None) -> Figure:
-    """Draw the peak and its frequency over the parameter."""
-    return track_figure(track.to_json(), ax=ax)
-
-
-def of_map(found: ResponseMap, ax: Into = None) -> Figure:
-    """Draw the map with its ridge."""
-    return map_figure(found.to_json(), ax=ax)
 
 
 def of_stability(found: Stability, ax: Into = None) -> Figure:
