@@ -126,13 +126,17 @@ class BranchSigns:
     def by_determinant(self) -> tuple[Mark, ...]:
         """Folds and branch points."""
         marks = []
+
+        def alike(sign: float, node: PointRow) -> bool:
+            return self.sign(node) == sign
+
         for i, (left, right) in enumerate(pairwise(self.nodes)):
             if left.tangent[-1] * right.tangent[-1] < 0.0:
                 fold = fold_between(partial(self.solver.between, left, right), left, right)
                 node, smooth = fold or (left, True)
                 marks.append(self.mark(MarkKind.FOLD, node, i, corner=not smooth))
             elif self.signs[i] * self.signs[i + 1] < 0.0:
-                node = self.halved(i, lambda node, sign=self.signs[i]: self.sign(node) == sign, _HALVINGS)
+                node = self.halved(i, partial(alike, self.signs[i]), _HALVINGS)
                 marks.append(self.mark(MarkKind.BRANCH_POINT, node, i))
         return tuple(marks)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -19,9 +19,11 @@ from solver.continuation.branch import Branch, Peak
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, Z
 from solver.jit.timer import clock
 from solver.studies.peaks.envelope_minimum import Lowest, rows_at
-from solver.studies.peaks.survey import Look
 from solver.studies.peaks.track_results import ChosenBy, LeastPeak
-from solver.studies.peaks.tracker import Tracker
+
+if TYPE_CHECKING:
+    from solver.studies.peaks.survey import Look
+    from solver.studies.peaks.tracker import Tracker
 
 CONSTANT = 1e-7  # relative difference within which heights, frequencies and widths are the same
 LEVEL = 1e-9  # relative change over the range by its slope up to which a peak is level
@@ -37,7 +39,7 @@ BESIDE = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)  # of the range: how far beside an inter
 SHALLOW = 1e-8  # relative depth that is no dip
 BEYOND = 2e-3  # of the range: how far beyond the end of a line a peak is gone
 
-Prove = Callable[[Tracker, float], LeastPeak]
+Prove = Callable[["Tracker", float], LeastPeak]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,6 +9,7 @@ and followed. That costs half a response a place, and proves nothing: what is no
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +17,9 @@ from solver.continuation.extrema.kernels.peak_continuation import HEIGHT
 from solver.jit.fourier import Real
 from solver.studies.peaks.envelope_minimum import Lowest, flat, minima
 from solver.studies.peaks.survey import HaltedError
-from solver.studies.peaks.tracker import Tracker
+
+if TYPE_CHECKING:
+    from solver.studies.peaks.tracker import Tracker
 
 NEAR = 1.05  # times the best peak: how high further basins may be that are looked for
 APART = 0.08  # share of the range: no look is made between places closer than that
