@@ -193,7 +193,7 @@ def test_text_that_is_no_certificate_is_refused(tmp_path: Path, capsys: pytest.C
     for text in texts:
         with pytest.raises(checker.RejectedError):
             checker.check(checker.read(text))
-        file.write_text(each, encoding="utf-8")
+        file.write_text(text, encoding="utf-8")
         assert main(["check-proof", str(file)]) == 2
         assert "must be a certificate" in capsys.readouterr().err
     file.write_bytes(b"\xff\xfe\x00")
