@@ -50,7 +50,7 @@ def evaluate(
     responses: list[CaseResponse] = []
     rows: list[CriterionRow] = []
     for case in problem.cases:
-        known = [response.branch for response in responses if response.case == case.beside]
+        known = [response.branch for response in responses if response.case == case.served_by]
         earlier = [] if before is None else [one.branch for one in before.responses if one.case == case.name]
         found = _case(problem, case, values, known, earlier, gradients, errors, should_stop)
         responses += found[0]
@@ -64,13 +64,7 @@ def _case(
     problem: Problem, case: LoadCase, values: Mapping[str, float], known: Sequence[Branch],
     earlier: Sequence[Branch], gradients: bool, errors: bool, should_stop: ShouldStop,
 ) -> tuple[list[CaseResponse], list[CriterionRow]]:  # fmt: skip
-    """Compute the responses and rows of one case.
-
-    Parameters
-    ----------
-    known : responses of a case with another DOF alone.
-    earlier : of the same design by another measure, or with other harmonics.
-    """
+    """Compute the responses and rows of one case."""
     here = case.scene.with_values(parameter_values(problem.variables, values))
     effects = effects_of(problem, here)
     judge = Judge(problem=problem, case=case, gradients=gradients)

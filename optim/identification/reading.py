@@ -124,13 +124,7 @@ def _of_text(scene: Scene, given: str, columns: Sequence[str]) -> FromText:
 
 
 def _said(file: Path, said: Mapping[str, str], paths: frozenset[str]) -> tuple[Head, dict[str, str]]:
-    """Return what is said behind a file's name: of its rows, and to read it by the words of its format.
-
-    Raises
-    ------
-    DataError
-        A word that says nothing.
-    """
+    """Return what is said behind a file's name: of its rows, and to read it by the words of its format."""
     words = format_of(file).words if said else {}
     known = (KIND_WORD, *known_words(), *words)
     for key, value in said.items():

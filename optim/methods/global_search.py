@@ -34,9 +34,9 @@ from optim.methods.linearised import (
 )
 from optim.methods.surrogate import (
     Taylor,
-    between,
     candidates,
     places,
+    predicted,
     promising,
     quasi_random,
     taylor_of,
@@ -418,7 +418,7 @@ class Samples:
             return True
         models = self.models()
         known = np.array([model.place for model in models])
-        mean, spread = between(models, known, z[None, :])
+        mean, spread = predicted(models, known, z[None, :])
         least = min(model.value for model in models)
         return bool(mean[0] - LOOSE * spread[0] < WORTH * least)
 

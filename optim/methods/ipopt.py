@@ -169,12 +169,7 @@ def _fill(
     numbers: Real,
     slopes: Real,
 ) -> list[int | None]:
-    """Put each row in its place: the nearest in frequency of the same quantity and case; the largest wins.
-
-    Returns
-    -------
-    Which row is in each place.
-    """
+    """Put each row in its place: the nearest in frequency of the same quantity and case; the largest wins."""
     fresh = list(places)
     taken: list[int | None] = [None] * len(places)
     for i, (row, value, slope) in enumerate(zip(rows, values, by_z, strict=True)):

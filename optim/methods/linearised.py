@@ -287,6 +287,11 @@ class Local:
     standing: Annotated[tuple[float, float], "What designs are compared by; see `standing`."]
 
     @property
+    def rank(self) -> tuple[tuple[float, float], bool]:
+        """What ends are compared by, the best first: of equal ones a settled one."""
+        return self.standing, not self.settled
+
+    @property
     def optimum(self) -> LocalOptimum:
         """It as results tell it."""
         return optimum_at(self.evaluation, settled=self.settled, feasible=self.feasible)

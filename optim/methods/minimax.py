@@ -244,7 +244,7 @@ def thorough_search(
     again = minimax_search(
         evaluate, variables, found.evaluation, model_of, remembered=0, enough=enough, strict=strict
     )
-    return min(found, again, key=lambda local: (local.standing, not local.settled))
+    return min(found, again, key=lambda local: local.rank)
 
 
 def _curvature(

@@ -149,7 +149,7 @@ def promising(
     places = places[far.min(axis=1) >= apart]
     if not len(places):
         return []
-    mean, spread = between(models, known, places)
+    mean, spread = predicted(models, known, places)
     low = (-mean if above else mean) - doubt * spread
     chosen: list[Real] = []
     for i in np.argsort(low):
@@ -160,7 +160,7 @@ def promising(
     return chosen
 
 
-def between(models: Sequence[Taylor], known: Real, places: Real) -> tuple[Real, Real]:
+def predicted(models: Sequence[Taylor], known: Real, places: Real) -> tuple[Real, Real]:
     """Return the mean of the predictions of the nearest models at (k, n) places, and their spread."""
     distance = np.linalg.norm(places[:, None, :] - known, axis=2)
     count = min(NEAREST * known.shape[1] + 2, len(models))

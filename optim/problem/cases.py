@@ -76,7 +76,7 @@ class LoadCase:
     own: Annotated[Mapping[str, float], "Parameter paths it sets, which nothing else may."] = field(
         default_factory=dict, compare=False, repr=False
     )
-    beside: Annotated[
+    served_by: Annotated[
         str | None,
         "An earlier case that differs in the observed DOF alone, so that one response serves both.",
     ] = None
@@ -122,7 +122,7 @@ def read_cases(
         raise DesignError("cases", cases, "must be a list of at least one table")
     read = [case for i, table in enumerate(cases) for case in read_case(scene, i, table, variables)]
     check_names(read)
-    return tuple(replace(case, beside=_served_by(case, read[:i])) for i, case in enumerate(read))
+    return tuple(replace(case, served_by=_served_by(case, read[:i])) for i, case in enumerate(read))
 
 
 def _served_by(case: LoadCase, earlier: Sequence[LoadCase]) -> str | None:

@@ -73,17 +73,15 @@ def _mistuning(disk: dict[str, Any]) -> None:
     names = [of] if isinstance(of, str) else of
     if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
         raise ValueError("must have in `mistuning.of` a part of the disk, or a list of them")
-    if not isinstance(seeds, list) or not all(_whole(seed) for seed in seeds):
+    if not isinstance(seeds, list) or not all(
+        isinstance(seed, int) and not isinstance(seed, bool) and 0 <= seed < 2**63 for seed in seeds
+    ):
         raise ValueError("must have in `mistuning.seeds` a list of whole numbers >= 0")
     if not isinstance(rows, list) or not rows:
         raise ValueError("must have in `mistuning.values` a list of factors, or of lists of them")
     factors = [factor for row in rows for factor in (row if isinstance(row, list) else [row])]
     if any(isinstance(f, bool) or not isinstance(f, int | float) for f in factors):
         raise ValueError("must have in `mistuning.values` numbers alone")
-
-
-def _whole(value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 2**63
 
 
 Uncertain = Annotated[

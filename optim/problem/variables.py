@@ -152,10 +152,17 @@ def check_variables(
     checked = []
     for name, bounds in variables.items():
         paths = tuple(part.strip() for part in str(name).split(","))
-        low, high = _bounds(key, name, bounds)
+        low, high = number_pair((key, name), bounds)
+        if not low < high:
+            raise DesignError((key, name), bounds, "must have low < high")
         for path in paths:
             with at(key, name):
-                _check_path(scene, key, path, low, high)
+                parameter = resolve(scene, path)
+                if parameter.kind is Kind.FREQUENCY:
+                    wanted = "cannot be the frequency: the band of the scene is searched"
+                    raise DesignError(key, path, wanted)
+                parameter.check(f"{key}.{path} (low)", low)
+                parameter.check(f"{key}.{path} (high)", high)
             if path in taken:
                 wanted = f"must stand in one variable, it is in {taken[path]} too"
                 raise DesignError(key, path, wanted, place=(key, path))
@@ -163,15 +170,6 @@ def check_variables(
         how = _scaling(name, scaling.get(name, Scaling.AUTO.value), low, high)
         checked.append(BoundedVariable(name=name, paths=paths, low=low, high=high, logarithmic=how))
     return tuple(checked)
-
-
-def _check_path(scene: Scene, key: str, path: str, low: float, high: float) -> None:
-    parameter = resolve(scene, path)
-    if parameter.kind is Kind.FREQUENCY:
-        wanted = "cannot be the frequency: the band of the scene is searched"
-        raise DesignError(key, path, wanted)
-    parameter.check(f"{key}.{path} (low)", low)
-    parameter.check(f"{key}.{path} (high)", high)
 
 
 def _scaling(name: str, wanted: object, low: float, high: float) -> bool:
@@ -182,13 +180,6 @@ def _scaling(name: str, wanted: object, low: float, high: float) -> bool:
     return how is Scaling.LOGARITHMIC or (
         how is Scaling.AUTO and low > 0.0 and high / low >= LOGARITHMIC_FROM
     )
-
-
-def _bounds(key: str, path: str, bounds: object) -> tuple[float, float]:
-    low, high = number_pair((key, path), bounds)
-    if not low < high:
-        raise DesignError((key, path), bounds, "must have low < high")
-    return low, high
 
 
 def _default(scene: Scene) -> dict[str, tuple[float, float]]:

@@ -32,7 +32,7 @@ from optim.results.doubts import WELL_KNOWN
 from optim.robust.robust_result import RobustResult, RobustStatus, Side, Spread
 from optim.robust.robust_search import CLOSED, RobustSearch, SearchProgress, cutting_sets, sampled
 from optim.robust.scenarios import Outcome, rank_of
-from optim.robust.worst_case import MOST_BESIDES, Aspect, UnknownScenarioError
+from optim.robust.worst_case import Aspect, UnknownScenarioError
 from optim.search import solve_problem
 from solver.jit.timer import clock
 from solver.results.known import worst_of
@@ -63,7 +63,14 @@ def side_of(
     search.ahead([(values, scenario) for scenario in drawn], gradients=slopes)
     samples = [search.outcome(values, scenario, gradients=slopes) for scenario in drawn]
     peaks = [found.highest(PEAK) if found.good else None for found in samples]
-    worst, unknown = _worst(search, values, samples, scenarios)
+    worst: Outcome | None = None
+    unknown: Scenario | None = None
+    try:
+        worst = search.look(
+            values, Aspect(quantity=PEAK, limited=False, plain=True), scenarios, samples
+        ).worst
+    except UnknownScenarioError as error:
+        unknown = error.scenario
     peak, band = nominal.highest(PEAK), nominal.highest(BAND)
     places = [Scenario()] if worst is None else [Scenario(), worst.scenario]
     known = worst_of(search.known(values, scenario) for scenario in dict.fromkeys(places))
@@ -74,20 +81,6 @@ def side_of(
         feasible=unknown is None and _feasible(search, values, samples, scenarios), unknown=unknown,
         known=known,
     )  # fmt: skip
-
-
-def _worst(
-    search: RobustSearch, values: Mapping[str, float], samples: Sequence[Outcome], known: Sequence[Scenario]
-) -> tuple[Outcome | None, Scenario | None]:
-    """Return the design in the scenario of the highest peak; or None and the scenario that is not known."""
-    aspect = Aspect(quantity=PEAK, limited=False, plain=True)
-    ranked = sorted((o for o in samples if o.good), key=lambda found: -aspect.worst(found.rows))
-    besides = [found.scenario for found in ranked[:MOST_BESIDES]]
-    try:
-        finding = search.pessimise(values, aspect, known, besides=besides, thorough=True)
-    except UnknownScenarioError as error:
-        return None, error.scenario
-    return finding.worst, None
 
 
 def _feasible(

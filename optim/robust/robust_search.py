@@ -112,6 +112,15 @@ class RobustSearch:
             ahead=lambda scenarios: self.ahead((values, scenario) for scenario in scenarios), **more,
         )  # fmt: skip
 
+    def look(
+        self, values: Mapping[str, float], aspect: Aspect, known: Sequence[Scenario],
+        samples: Sequence[Outcome],
+    ) -> Finding:  # fmt: skip
+        """Return the worst scenario of a design, from a look at the whole set that begins with samples."""
+        ranked = sorted((one for one in samples if one.good), key=lambda found: -aspect.worst(found.rows))
+        besides = [found.scenario for found in ranked[:MOST_BESIDES]]
+        return self.pessimise(values, aspect, known, besides=besides, thorough=True)
+
     def _key(self, values: Mapping[str, float], scenario: Scenario, gradients: bool) -> Key:
         place = tuple(values[variable.name] for variable in self.variables)
         return place, scenario, gradients, self.problem.harmonics
@@ -160,7 +169,7 @@ class RobustSearch:
         # rows of scenarios that a quantile leaves out must not come back as cuts at all.
         if not found.settled and self.aim is not Aim.QUANTILE:
             again = self._searched(found.evaluation, scenarios, REMEMBERED)
-            found = min(found, again, key=lambda local: (local.standing, not local.settled))
+            found = min(found, again, key=lambda local: local.rank)
         if not found.feasible:
             # What is minimised may lead out of limits that can be kept, to an end that breaks them.
             kept = self._searched(begin, scenarios, 0, of=of_limits, enough=1.0 + KEPT).evaluation
@@ -325,7 +334,10 @@ def _worse(
         master = aspect.worst(here.rows)
         finding = search.pessimise(values, aspect, progress.scenarios)
         if drawn and _excess(aspect, finding.value, master) <= CLOSED and not search.uncertain.finite:
-            finding = _checked(search, values, aspect, progress, drawn)
+            inside = [scenario for scenario in drawn if search.uncertain.inside_of(scenario)]
+            search.ahead((values, scenario) for scenario in inside)
+            samples = [search.outcome(values, scenario) for scenario in inside]
+            finding = search.look(values, aspect, progress.scenarios, samples)
         progress.finished = progress.finished and finding.finished
         worse = [o for o in finding.outcomes if _excess(aspect, aspect.worst(o.rows), master) > CLOSED]
         found.append((_distinct(worse), _excess(aspect, finding.value, master)))
@@ -341,19 +353,6 @@ def _distinct(worse: Sequence[Outcome]) -> list[Outcome]:
         if len(kept) < AT_ONCE and all(math.dist(other.xi, here.xi) >= CLOUD for other in same):
             kept.append(found)
     return kept
-
-
-def _checked(
-    search: RobustSearch, values: Mapping[str, float], aspect: Aspect, progress: SearchProgress,
-    drawn: Sequence[Scenario],
-) -> Finding:  # fmt: skip
-    """Return the worst scenarios again, looking at the whole set and climbing from the worst drawn ones."""
-    inside = [scenario for scenario in drawn if search.uncertain.inside_of(scenario)]
-    search.ahead((values, scenario) for scenario in inside)
-    asked = [search.outcome(values, scenario) for scenario in inside]
-    ranked = sorted((o for o in asked if o.good), key=lambda found: -aspect.worst(found.rows))
-    besides = [found.scenario for found in ranked[:MOST_BESIDES]]
-    return search.pessimise(values, aspect, progress.scenarios, besides=besides, thorough=True)
 
 
 def _excess(aspect: Aspect, worst: float, master: float) -> float:

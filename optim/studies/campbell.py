@@ -75,7 +75,9 @@ def campbell_diagram(
         here = with_engine_order(scene, group[0]) if cyclic else scene
         if scene.speed_order is not None:
             here = here.model_copy(update={"speed_order": float(group[0])})
-        low, high = looked_at or _needed(scene, speeds, group)
+        needed = [order * speed / 60.0 for order in group for pair in speeds for speed in pair]
+        band = scene.observe.band
+        low, high = looked_at or (min(band[0], *needed), max(band[1], *needed))
         progress = part_of(on_progress, i / len(groups), (i + 1) / len(groups), count)
         branch = sweep(
             here, start=low, stop=high, harmonics=harmonics, limit=limit, on_progress=progress,
@@ -208,12 +210,6 @@ def _crossing(at_hz: float, amplitude: float, error: float, order: int, speeds: 
 def _is_running(speed: float, speeds: Ranges) -> bool:
     """Return whether a speed is a running speed; an end of a range is, whatever its rounding."""
     return any(low * (1.0 - 1e-12) <= speed <= high * (1.0 + 1e-12) for low, high in speeds)
-
-
-def _needed(scene: Scene, speeds: Ranges, orders: Sequence[int]) -> tuple[float, float]:
-    """Return the range of the scene's band and of the frequencies of the running speeds."""
-    ends = [order * speed / 60.0 for order in orders for pair in speeds for speed in pair]
-    return min(scene.observe.band[0], *ends), max(scene.observe.band[1], *ends)
 
 
 def _scaled(ranges: Ranges, factor: float) -> Ranges:

@@ -66,7 +66,9 @@ def sensitivities(
             scene=here, status=status, branch=branch, peaks=(), rows=(),
             band_by_limit=math.nan, left_out=(), seconds=clock() - begun,
         )  # fmt: skip
-    paths, left_out = _differentiable(here, branch, known)
+    reasons = {path: reason_without(here, branch.balance, path) for path in known}
+    paths = [path for path, reason in reasons.items() if not reason]
+    left_out = tuple(WithoutDerivative(path, reason) for path, reason in reasons.items() if reason)
     peaks = tuple(peak for peak in branch.peaks if peak.value >= COMPETES * branch.peak.value)
     rows, by_limit = _rows(here, branch, peaks, paths, fixed=limit is not None)
     exist = all(np.isfinite([*row.peaks, row.band]).all() for row in rows)
@@ -76,15 +78,6 @@ def sensitivities(
     )  # fmt: skip
     in_order = tuple(sorted(rows, key=partial(_rank, found)))
     return replace(found, rows=in_order, seconds=clock() - begun)
-
-
-def _differentiable(
-    scene: Scene, branch: Branch, known: tuple[str, ...]
-) -> tuple[list[str], tuple[WithoutDerivative, ...]]:
-    """Return the paths with a value and a derivative, and the others with the reason."""
-    reasons = {path: reason_without(scene, branch.balance, path) for path in known}
-    left_out = tuple(WithoutDerivative(path, reason) for path, reason in reasons.items() if reason)
-    return [path for path, reason in reasons.items() if not reason], left_out
 
 
 def _rows(

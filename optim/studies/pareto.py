@@ -216,7 +216,10 @@ class _Front:
             history=tuple(search.history[1:]),
             evaluations=len(search.history) - 1, work=float(len(search.history) - 1), seconds=0.0,
         )  # fmt: skip
-        self.found.append(ParetoPoint.of(only_if_known(result), _slope(search, local, width)))
+        # d peak / d band along the front [m/Hz] from the multipliers of the limit on the band.
+        pull = sum(x for row, x in local.conditions.rows if row.quantity is BAND)
+        slope = -pull * search.model(local.evaluation).unit / width if local.settled else math.nan
+        self.found.append(ParetoPoint.of(only_if_known(result), slope))
 
     def _searched(
         self,
@@ -239,7 +242,7 @@ class _Front:
                 begin.append(evaluation)
         local_search = local_search_of(search.problem.method)
         ends = [local_search(search, search.variables, evaluation, search.model) for evaluation in begin]
-        return min(ends, key=lambda local: (local.standing, not local.settled))
+        return min(ends, key=lambda local: local.rank)
 
 
 def _at_limit(evaluation: DesignEvaluation, width: float) -> DesignEvaluation:
@@ -271,11 +274,3 @@ def steepest(model: Model, variables: Sequence[BoundedVariable]) -> float:
         bounds=(0.0, None),
     )  # fmt: skip
     return -float(found.fun) if found.success else math.nan
-
-
-def _slope(search: DesignSearch, local: Local, width: float) -> float:
-    """Return d peak / d band along the front [m/Hz] from the multipliers of the limit on the band."""
-    found = [x for row, x in local.conditions.rows if row.quantity is BAND]
-    if not local.settled:
-        return math.nan
-    return -sum(found) * search.model(local.evaluation).unit / width

@@ -80,7 +80,7 @@ class DecayRun(CurveRun):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Along:
+class _AtTimes:
     """s = ln a at times, and how it moves."""
 
     s: Annotated[Real, "NaN beyond the course, (m,)."]
@@ -100,7 +100,7 @@ class _Course:
     frequency: Annotated[CubicSpline, "ln ω and its derivatives likewise."]
     stored: Annotated[CubicSpline, "g and its derivatives likewise."]
 
-    def at(self, t: Real) -> _Along:
+    def at(self, t: Real) -> _AtTimes:
         """Return the course at times."""
         s = np.interp(t, self.tau[:, 0], self.s, left=math.nan, right=math.nan)
         place = np.interp(t, self.tau[:, 0], np.arange(self.s.size, dtype=np.float64))
@@ -112,7 +112,7 @@ class _Course:
         by_paths = -speed[:, None] * self._time(s, before)[:, 1:]
         bend = speed * (self.damping(s, 1) - self.stored(s, 1) / self.stored(s))[:, 0]
         by_speed = bend[:, None] * by_paths - speed[:, None] * paces[:, 1:] / paces[:, :1]
-        return _Along(s=s, speed=speed, by_paths=by_paths, bend=bend, speed_by_paths=by_speed)
+        return _AtTimes(s=s, speed=speed, by_paths=by_paths, bend=bend, speed_by_paths=by_speed)
 
     def paces(self, s: Real) -> Real:
         """Return −dτ/ds and its derivatives by the paths, (m, 1 + n_paths)."""
@@ -122,7 +122,7 @@ class _Course:
         found[:, :1] = pace * stored[:, :1]
         return np.asarray(found)
 
-    def hertz(self, along: _Along) -> tuple[Real, Real]:
+    def hertz(self, along: _AtTimes) -> tuple[Real, Real]:
         """Return the frequency of the decaying motion [Hz], (m,), and its derivatives by the paths at s."""
         told, damping = self.frequency(along.s), self.damping(along.s)
         zeta2 = np.exp(2.0 * (damping[:, 0] - told[:, 0]))

@@ -134,13 +134,7 @@ _Reading = tuple[complex | float, ...]
 def _readings(
     source: str, name: str, cells: Sequence[str], lines: Sequence[int], forms: Sequence[NumberFormat]
 ) -> dict[NumberFormat, _Reading]:
-    """Return what a column can be, by the way its numbers are written.
-
-    Raises
-    ------
-    DataError
-        Nothing.
-    """
+    """Return what a column can be, by the way its numbers are written."""
     found = {}
     for form in forms:
         values = tuple(value for cell in cells if (value := _value(cell, form)) is not None)

@@ -257,13 +257,7 @@ def _binary(
 
 
 def _table(one: _Function, paths: frozenset[str]) -> Table:
-    """Return a function as a table, if it is a response in one DOF.
-
-    Raises
-    ------
-    DataError
-        It is something else, said by its name.
-    """
+    """Return a function as a table, if it is a response in one DOF."""
     _check_kind(one)
     motion = _motion(one)
     hertz = unit_of(Dimension.FREQUENCY, one.abscissa.unit or None)
@@ -316,13 +310,7 @@ def _axis(axis: _Axis) -> str:
 
 
 def _motion(one: _Function) -> Unit:
-    """Return the unit of numerator and denominator together.
-
-    Raises
-    ------
-    DataError
-        It is none of a motion, or not that of the types of both; or nothing says what the function is.
-    """
+    """Return the unit of numerator and denominator together."""
     ordinate, below = one.ordinate, one.denominator
     label = unit_of(Dimension.MOTION, ordinate.unit) if ordinate.unit else None
     if ordinate.unit and label is None:

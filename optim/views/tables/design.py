@@ -42,28 +42,50 @@ def _kept(found: Json) -> bool:
 def front(found: Json) -> Iterator[Block]:
     """The points of a front of peak against band with what each costs in terms of the other."""
     points: Sequence[Json] = found["points"]
-    names = tuple(points[0]["values"]) if points else ()
     hertz = _price(max((point["band_hz"] for point in points), default=1.0))
     metres = _price(min((point["peak"] for point in points), default=1.0))
-    rows: list[tuple[str, ...]] = [
-        (
-            *(parameter(name, point["values"][name]) for name in names),
-            units.length(point["peak"]),
-            _error(point),
-            f"{units.number(point['band_hz'])} Hz",
-            "" if point["slope"] is None else units.length(abs(point["slope"]) * hertz),
-            "" if point["hz_per_metre"] is None else f"{units.number(metres * point['hz_per_metre'])} Hz",
-            "knee" if index == found["knee"] else "",
-        )
-        for index, point in enumerate(points)
-    ]
-    costs = (f"peak for {hertz:g} Hz less band", f"band for {units.length(metres)} less peak")
-    columns = (*names, "peak", "error", "band", *costs, "")
-    yield ResultTable(f"Front of {found['scene']}: peak against band", columns, rows)
+    knee = None if found["knee"] is None else points[found["knee"]]
+
+    def less(point: Json) -> str:
+        return "" if point["slope"] is None else units.length(abs(point["slope"]) * hertz)
+
+    def wider(point: Json) -> str:
+        per = point["hz_per_metre"]
+        return "" if per is None else f"{units.number(metres * per)} Hz"
+
+    yield _designs(
+        f"Front of {found['scene']}: peak against band",
+        points,
+        {
+            "peak": lambda point: units.length(point["peak"]),
+            "error": _error,
+            "band": lambda point: f"{units.number(point['band_hz'])} Hz",
+            f"peak for {hertz:g} Hz less band": less,
+            f"band for {units.length(metres)} less peak": wider,
+            "": lambda point: "knee" if point is knee else "",
+        },
+    )
     pairs = [("not found", f"band of {units.number(width)} Hz") for width in found["missed"]]
     pairs += [("end", end["status"]) for end in found["ends"] if not end["reached"]]
     effort = f"{found['evaluations']} designs in {units.duration(found['seconds'])}"
     yield Summary("", [*Measured.of_result(found).pairs, *pairs, *known_pairs(found), ("effort", effort)])
+
+
+def _designs(title: str, found: Sequence[Json], columns: Mapping[str, Callable[[Json], str]]) -> ResultTable:
+    """A table of designs: their variables, then what is told of each."""
+    names = tuple(found[0]["values"]) if found else ()
+    rows = [
+        (
+            *(parameter(name, one["values"][name]) for name in names),
+            *(show(one) for show in columns.values()),
+        )
+        for one in found
+    ]
+    return ResultTable(title, (*names, *columns), rows)
+
+
+def _yes(so: bool) -> str:
+    return "yes" if so else "no"
 
 
 def _error(point: Json) -> str:
@@ -193,18 +215,15 @@ def _checked(found: Json) -> ResultTable | None:
     checked: Sequence[Json] = found.get("checked", ())
     if not checked:
         return None
-    names = tuple(checked[0]["values"])
-    rows: list[tuple[str, ...]] = [
-        (
-            *(parameter(name, one["values"][name]) for name in names),
-            str(one["n_harmonics"]),
-            "unknown" if one["peak"] is None else units.length(one["peak"]),
-            "yes" if one["feasible"] else "no",
-        )
-        for one in checked
-    ]
-    columns = (*names, "harmonics", "peak", "keeps the limits")
-    return ResultTable("Again with more harmonics", columns, rows)
+    return _designs(
+        "Again with more harmonics",
+        checked,
+        {
+            "harmonics": lambda one: str(one["n_harmonics"]),
+            "peak": lambda one: "unknown" if one["peak"] is None else units.length(one["peak"]),
+            "keeps the limits": lambda one: _yes(one["feasible"]),
+        },
+    )
 
 
 def _options(found: Json) -> ResultTable | None:
@@ -275,19 +294,16 @@ def _basins(found: Json) -> ResultTable | None:
     basins: Sequence[Json] = found.get("basins", ())
     if len(basins) < 2:
         return None
-    names = tuple(basins[0]["values"])
-    rows: list[tuple[str, ...]] = [
-        (
-            *(parameter(name, basin["values"][name]) for name in names),
-            units.length(basin["peak"]),
-            "yes" if basin["settled"] else "no",
-            "yes" if basin.get("proven", True) else "no",
-            "yes" if basin["feasible"] else "no",
-        )
-        for basin in basins
-    ]
-    columns = (*names, "peak", "settled", "proven", "keeps the limits")
-    return ResultTable("Local optima", columns, rows)
+    return _designs(
+        "Local optima",
+        basins,
+        {
+            "peak": lambda basin: units.length(basin["peak"]),
+            "settled": lambda one: _yes(one["settled"]),
+            "proven": lambda one: _yes(one.get("proven", True)),
+            "keeps the limits": lambda one: _yes(one["feasible"]),
+        },
+    )
 
 
 _UNKNOWN = "not known"
@@ -373,5 +389,5 @@ SIDE_LINES: tuple[tuple[str, Callable[[Json], str]], ...] = (
     ("in the scenario", lambda side: "" if side["worst"] is None else side["worst"]["scenario"]["words"]),
     ("mean of the samples", lambda side: _length(side["samples"]["mean"])),
     ("95 % of the samples below", lambda side: _quantile(side, 0.95)),
-    ("keeps the limits", lambda side: "yes" if side["feasible"] else "no"),
+    ("keeps the limits", lambda side: _yes(side["feasible"])),
 )
