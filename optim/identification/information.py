@@ -316,10 +316,9 @@ def _judged(
         kept = predicted.reached
         if not kept.any():
             continue
-        shape = new.noise_shape(np.where(kept, predicted.values, 0.0))[kept]
-        noise = shape * (
-            level if level is not None else float(np.median(best.sd[part] / _shape(runs, best, part)))
-        )
+        noise = new.noise_shape(np.where(kept, predicted.values, 0.0))[kept]
+        nearly = np.where(best.active[part], best.fitted.values[part], runs.observations[part])
+        noise *= np.median(best.sd[part] / run.noise_shape(nearly)) if level is None else level
         rows = unknowns.by_scaled(z, predicted.slopes[kept]) / noise[:, None]
         after = before + rows.T @ rows
         gain = 0.5 * (np.linalg.slogdet(after)[1] - np.linalg.slogdet(before)[1])
@@ -331,10 +330,3 @@ def _judged(
                 factor=float(shrunk[i]),
             )  # fmt: skip
     return tried
-
-
-def _shape(runs: Runs, best: LocalFit, part: slice) -> Real:
-    """Return the noise shape of a run at its predictions, its data where a point was not reached."""
-    run = next(one for one, at_part in zip(runs.runs, runs.slices, strict=True) if at_part == part)
-    values = np.where(best.active[part], best.fitted.values[part], runs.observations[part])
-    return run.noise_shape(values)

@@ -207,7 +207,7 @@ def _conditions_in_si(scene: Scene, table: Table) -> Table:
         if None not in forces:
             columns[path] = columns[path] * (forces[1].factor if forces[1] else 1.0)
         elif _plain_unit(text) != _plain_unit(own):
-            raise DataError(table.source, text, f"must be in {own or '1'}", column=path, place=table.place)
+            raise table.refusal(text, f"must be in {own or '1'}", path)
     return replace(table, columns=columns)
 
 

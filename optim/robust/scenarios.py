@@ -23,9 +23,8 @@ from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.walk import ContinuationSettings
 from solver.results.known import Known, worst_of
+from solver.results.watch import ShouldStop
 from solver.studies.blades import blade_peaks, blade_rows
-
-ShouldStop = Callable[[], bool] | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,7 +16,6 @@ import numpy as np
 
 from optim.identification.data.measured import Column, DataKind, MeasuredRows, Predicted, RunModel
 from optim.identification.data.measured_table import Dimension, Table, check_monotone
-from optim.problem.checks import DataError
 from optim.problem.variables import Real
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects
@@ -167,7 +166,7 @@ def _phases(table: Table, frequency: float) -> Real:
             f"must be sampled over a whole period, 1/frequency = {1.0 / frequency:g} s, without gaps of an "
             "eighth of it: give the `frequency` of the motion in the head"
         )
-        raise DataError(table.source, float(time[-1] - time[0]), wanted, column="time", place=table.place)
+        raise table.refusal(float(time[-1] - time[0]), wanted, "time")
     return np.asarray(tau)
 
 

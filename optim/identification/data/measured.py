@@ -15,7 +15,6 @@ from typing import Annotated, ClassVar, Self
 import numpy as np
 
 from optim.identification.data.measured_table import Dimension, Table, check_sign
-from optim.problem.checks import DataError
 from optim.problem.variables import Real
 from solver.extensions import Kinds
 from solver.jit.fourier import Integer
@@ -286,4 +285,4 @@ def whole_word(table: Table, word: str) -> int | None:
         return int(text)
     except ValueError:
         wanted = f"`{word}` must be a whole number"
-        raise DataError(table.source, text, wanted, place=table.place) from None
+        raise table.refusal(text, wanted) from None

@@ -26,7 +26,6 @@ from optim.identification.data.measured import (
 )
 from optim.identification.data.measured_table import Dimension, Table
 from optim.identification.data.response import measured_dof, observing_dof
-from optim.problem.checks import DataError
 from optim.problem.variables import Real
 from solver.continuation.branch import Branch
 from solver.continuation.branches.sweep import sweep
@@ -133,7 +132,7 @@ def _checked_blades(scene: Scene, table: Table) -> str:
     try:
         count = len(blade_rows(scene, dof))
     except SettingError as error:
-        raise DataError(table.source, dof, f"`dof`: {error}", place=table.place) from error
+        raise table.refusal(dof, f"`dof`: {error}") from error
     blades = table.columns["blade"]
     bad = np.flatnonzero((blades != np.round(blades)) | (blades < 0) | (blades >= count))
     if bad.size:

@@ -218,9 +218,9 @@ class Table:
             source, shown, wanted, line=self.line(row), column=column, place=self.place
         )  # fmt: skip
 
-    def refusal(self, value: object, wanted: str) -> DataError:
-        """Return the refusal of the whole."""
-        return DataError(self.source, value, wanted, place=self.place)
+    def refusal(self, value: object, wanted: str, column: str = "") -> DataError:
+        """Return the refusal of the whole, or of a column."""
+        return DataError(self.source, value, wanted, column=column, place=self.place)
 
     def need(self, fewest: int, what: str) -> None:
         """Raise DataError unless there are so many rows."""
@@ -254,7 +254,7 @@ def check_numbers(table: Table) -> None:
     for name, values in table.columns.items():
         if len(values) != len(table):
             wanted = f"must have {len(table)} numbers as the other columns"
-            raise DataError(table.source, len(values), wanted, column=name, place=table.place)
+            raise table.refusal(len(values), wanted, name)
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size:
             raise table.error(

@@ -17,7 +17,6 @@ import numpy as np
 
 from optim.identification.data.measured import FLOOR, Column, DataKind, MeasuredRows, Predicted, RunModel
 from optim.identification.data.measured_table import Dimension, Table, check_monotone, check_sign
-from optim.problem.checks import DataError
 from optim.problem.variables import Real
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects
@@ -266,13 +265,11 @@ def read_response(scene: Scene, table: Table) -> MeasuredRows:
     unit = table.units.get(column)
     _check_units(table, column)
     if unit is not None and unit.per_force and here.excitation[0].base is not None:
-        raise DataError(
-            table.source, column, "is by a force: the scene's base moves", column=column, place=table.place
-        )
+        raise table.refusal(column, "is by a force: the scene's base moves", column)
     if unit is not None and (unit.order or unit.per_force):
         if quantity in (Quantity.MAX_ABS, Quantity.HALF_PEAK_TO_PEAK):
             wanted = "must be a displacement: velocities and accelerations do for `amplitude`, `real`, `imag`"
-            raise DataError(table.source, column, wanted, column=column, place=table.place)
+            raise table.refusal(column, wanted, column)
         spin = 2.0j * math.pi * frequencies * table.number("harmonic", 1.0)
         factor = (here.value("excitation.amplitude") if unit.per_force else 1.0) / spin**unit.order
         data = data * (factor if quantity is Quantity.COMPLEX else np.abs(factor))
@@ -301,7 +298,7 @@ def _check_units(table: Table, column: str) -> None:
             and (its.order, its.per_force) != (unit.order, unit.per_force)
         ):
             wanted = f"must be in a unit as that of `{column}`: both displacements, or both by a force"
-            raise DataError(table.source, other, wanted, column=other, place=table.place)
+            raise table.refusal(other, wanted, other)
 
 
 def _check_band(scene: Scene, table: Table) -> None:

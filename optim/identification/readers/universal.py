@@ -72,6 +72,10 @@ class _Function:
     data: Real | Complex
     system: Annotated[tuple[float, float] | None, "Lengths and forces of data set 164 in one of SI."]
 
+    def refusal(self, value: object, wanted: str, column: str) -> DataError:
+        """Return the refusal of what stands in a column."""
+        return DataError(self.source, value, wanted, column=column)
+
     @property
     def place(self) -> dict[str, str]:
         """What tells it from others of a file, in the words that choose it."""
@@ -262,9 +266,7 @@ def _table(one: _Function, paths: frozenset[str]) -> Table:
     motion = _motion(one)
     hertz = unit_of(Dimension.FREQUENCY, one.abscissa.unit or None)
     if hertz is None:
-        raise DataError(
-            one.source, one.abscissa.unit, wanted_unit(Dimension.FREQUENCY, ""), column="abscissa"
-        )
+        raise one.refusal(one.abscissa.unit, wanted_unit(Dimension.FREQUENCY, ""), "abscissa")
     data = one.data * motion.factor
     if np.iscomplexobj(data):
         data = (
@@ -284,25 +286,23 @@ _RIGHT = "must be a frequency response function (4), or a spectrum (12) whose un
 def _check_kind(one: _Function) -> None:
     """Refuse what is no translation over the frequency, by a force or by nothing."""
     if one.function not in (_GENERAL, _RESPONSE, _SPECTRUM):
-        raise DataError(one.source, f"{_name(one.function)} ({one.function})", _RIGHT, column="function")
+        raise one.refusal(f"{_name(one.function)} ({one.function})", _RIGHT, "function")
     if one.abscissa.kind != _FREQUENCY:
-        raise DataError(one.source, _axis(one.abscissa), "must be over the frequency (18)", column="abscissa")
+        raise one.refusal(_axis(one.abscissa), "must be over the frequency (18)", "abscissa")
     if abs(one.direction) > _LAST_TRANSLATION:
         wanted = "must be a translation (0 to 3): no DOF here is an angle"
-        raise DataError(one.source, _along(one.direction), wanted, column="direction")
+        raise one.refusal(_along(one.direction), wanted, "direction")
     below = one.denominator
     if below.kind in _ORDERS:
         wanted = (
             "must be an excitation force (13) or nothing (0): a motion over a motion is a transmissibility"
         )
-        raise DataError(one.source, _axis(below), wanted, column="denominator")
+        raise one.refusal(_axis(below), wanted, "denominator")
     if below.kind not in (_NOT_USED, _FORCE):
         wanted = "must be an excitation force (13) or nothing (0)"
-        raise DataError(one.source, _axis(below), wanted, column="denominator")
+        raise one.refusal(_axis(below), wanted, "denominator")
     if below.kind == _FORCE and abs(one.reference[1]) > _LAST_TRANSLATION:
-        raise DataError(
-            one.source, _along(one.reference[1]), "must be a force, not a moment", column="reference"
-        )
+        raise one.refusal(_along(one.reference[1]), "must be a force, not a moment", "reference")
 
 
 def _axis(axis: _Axis) -> str:
@@ -315,23 +315,23 @@ def _motion(one: _Function) -> Unit:
     label = unit_of(Dimension.MOTION, ordinate.unit) if ordinate.unit else None
     if ordinate.unit and label is None:
         wanted = wanted_unit(Dimension.MOTION, ordinate.unit)
-        raise DataError(one.source, ordinate.unit, wanted, column="ordinate")
+        raise one.refusal(ordinate.unit, wanted, "ordinate")
     if ordinate.kind not in _ORDERS and (ordinate.kind not in _UNKNOWN or label is None):
         wanted = "must be a displacement (8), velocity (11) or acceleration (12)"
-        raise DataError(one.source, _axis(ordinate), wanted, column="ordinate")
+        raise one.refusal(_axis(ordinate), wanted, "ordinate")
     length, force = one.system or (1.0, 1.0)
     motion = label or Unit(factor=1.0 / length, order=_ORDERS[ordinate.kind])
     if motion.order != _ORDERS.get(ordinate.kind, motion.order):
         wanted = f"must be the unit of the type, {_AXES[ordinate.kind]}"
-        raise DataError(one.source, ordinate.unit, wanted, column="ordinate")
+        raise one.refusal(ordinate.unit, wanted, "ordinate")
     if below.kind == _FORCE:
         motion = _over_force(one, motion, 1.0 / force)
     elif below.unit and not motion.per_force:
-        raise DataError(one.source, below.unit, "must be of the type of a force (13)", column="denominator")
+        raise one.refusal(below.unit, "must be of the type of a force (13)", "denominator")
     if one.function == _GENERAL and not (motion.per_force and np.iscomplexobj(one.data)):
-        raise DataError(one.source, f"{_name(_GENERAL)} (0)", _RIGHT, column="function")
+        raise one.refusal(f"{_name(_GENERAL)} (0)", _RIGHT, "function")
     if one.function == _SPECTRUM and not motion.per_force and motion.scaling is None:
-        raise DataError(one.source, ordinate.unit or "no unit", _RIGHT, column="ordinate")
+        raise one.refusal(ordinate.unit or "no unit", _RIGHT, "ordinate")
     return motion
 
 
@@ -340,18 +340,16 @@ def _over_force(one: _Function, motion: Unit, newtons: float) -> Unit:
     label = one.denominator.unit or None
     force = unit_of(Dimension.FORCE, label)
     if force is None:
-        raise DataError(one.source, label, wanted_unit(Dimension.FORCE, label), column="denominator")
+        raise one.refusal(label, wanted_unit(Dimension.FORCE, label), "denominator")
     if motion.scaling is not None:
         wanted = "must not be RMS or a peak alone: by a force it is the same of both"
-        raise DataError(one.source, one.ordinate.unit, wanted, column="ordinate")
+        raise one.refusal(one.ordinate.unit, wanted, "ordinate")
     if not motion.per_force:
         factor = motion.factor / (newtons if label is None else force.factor)
         return Unit(factor=factor, order=motion.order, per_force=True)
     above = one.ordinate.unit.rpartition("/")[0]
     if label is not None and unit_of(Dimension.MOTION, f"{above}/{label}") != motion:
-        raise DataError(
-            one.source, label, f"must be as in the ordinate, {one.ordinate.unit}", column="denominator"
-        )
+        raise one.refusal(label, f"must be as in the ordinate, {one.ordinate.unit}", "denominator")
     return motion
 
 
