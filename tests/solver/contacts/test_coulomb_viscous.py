@@ -68,7 +68,7 @@ def random_case(seed: int) -> tuple[solver.Scene, float]:
     return scene(force, kt=k, c=c, N0=10.0 ** rng.uniform(-1.3, 0.7)), hz
 
 
-@pytest.mark.few(12)
+@pytest.mark.few(24)
 @pytest.mark.parametrize("seed", range(24))
 def test_the_balance_is_what_marching_gives(seed: int) -> None:
     """Where it sticks all the time a mean may be left from how it began, and the answer says so."""
