@@ -12,3 +12,4 @@ FloatOrNaN: TypeAlias = Annotated[float, math.nan]  # NaN where it is not known:
 Real: TypeAlias = NDArray[np.float64]
 Complex: TypeAlias = NDArray[np.complex128]
 Integer: TypeAlias = NDArray[np.int64]
+Flags: TypeAlias = NDArray[np.bool_]

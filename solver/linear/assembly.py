@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.arrays import Real
 from solver.errors import SettingError
 from solver.linear.extra_terms import extra_slopes, extra_terms, own_terms, terms_of_line
 from solver.linear.model import Coordinates, ForceTerm, Identity, LinearModel, LinearModelDerivative
@@ -28,8 +29,6 @@ from solver.scene.cyclic.annulus import written_out
 from solver.scene.parameter_paths import parameter_of
 from solver.scene.scene import CyclicStructure, Excitation, LumpedStructure, MatricesStructure, Scene
 from solver.wording import listing, nearest
-
-FloatArray = NDArray[np.float64]
 
 
 def linear_model(scene: Scene) -> LinearModel:
@@ -104,19 +103,19 @@ def elements_of(structure: LumpedStructure | CyclicStructure, dofs: tuple[str, .
     )  # fmt: skip
 
 
-def _in_matrices(K: FloatArray, C: FloatArray, M: FloatArray) -> dict[str, FloatArray]:
+def _in_matrices(K: Real, C: Real, M: Real) -> dict[str, Real]:
     """Matrices that join no sectors."""
     nothing = _nothing(len(M))
     return Matrices(M, C, nothing, K, nothing)._asdict()
 
 
-def _motions(coordinates: Coordinates, forms: Sequence[tuple[Form, ...]]) -> tuple[FloatArray, FloatArray]:
+def _motions(coordinates: Coordinates, forms: Sequence[tuple[Form, ...]]) -> tuple[Real, Real]:
     """Motions of all contacts as rows, of this sector and of the next."""
     here, beyond = _contact_selection(coordinates.dofs, tuple(form for each in forms for form in each))
     return coordinates.rows(here), coordinates.rows(beyond)
 
 
-def row_of(scene: Scene, name: str) -> FloatArray:
+def row_of(scene: Scene, name: str) -> Real:
     """Return the row over the DOFs (n_dofs,) of a DOF or a recovered quantity of a scene.
 
     Raises
@@ -135,7 +134,7 @@ def row_of(scene: Scene, name: str) -> FloatArray:
 
 
 @lru_cache(maxsize=64)
-def _sum_of(dofs: tuple[str, ...], terms: tuple[tuple[str, float], ...]) -> FloatArray:
+def _sum_of(dofs: tuple[str, ...], terms: tuple[tuple[str, float], ...]) -> Real:
     found = np.zeros(len(dofs))
     for dof, factor in terms:
         found[dofs.index(dof)] += factor
@@ -169,12 +168,12 @@ def _pattern(dofs: tuple[str, ...], parts: tuple[tuple[str, float, float], ...])
 
 
 @lru_cache(maxsize=16)
-def _nothing(n: int) -> FloatArray:
+def _nothing(n: int) -> Real:
     return frozen(np.zeros((n, n)))
 
 
 @lru_cache(maxsize=64)
-def _identity(n: int) -> FloatArray:
+def _identity(n: int) -> Real:
     return frozen(np.eye(n))
 
 
@@ -215,7 +214,7 @@ def _coordinates(scene: Scene) -> Coordinates:
 
 
 @lru_cache(maxsize=256)
-def _contact_selection(dofs: tuple[str, ...], forms: tuple[Form, ...]) -> tuple[FloatArray, FloatArray]:
+def _contact_selection(dofs: tuple[str, ...], forms: tuple[Form, ...]) -> tuple[Real, Real]:
     here, beyond = np.zeros((len(forms), len(dofs))), np.zeros((len(forms), len(dofs)))
     for row, form in enumerate(forms):
         for dof, ahead, factor in form:
@@ -224,7 +223,7 @@ def _contact_selection(dofs: tuple[str, ...], forms: tuple[Form, ...]) -> tuple[
 
 
 @lru_cache(maxsize=1024)
-def _unit(dofs: Sequence[str], dof: str) -> FloatArray:
+def _unit(dofs: Sequence[str], dof: str) -> Real:
     return frozen(np.array([1.0 if name == dof else 0.0 for name in dofs]))
 
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from solver.arrays import Complex, Real
 from solver.linear.model import Blocks, Coordinates, ExtraTerms, OwnTerms, Terms
 from solver.matrices.values import frozen
 from solver.scene.bodies.body import REVOLUTIONS
@@ -19,9 +19,6 @@ from solver.scene.cyclic.sector_blocks import full_elimination
 from solver.scene.linear_terms import Entry
 from solver.scene.scene import MatricesStructure, Scene
 from solver.scene.scene_parameter import Slope
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 def own_terms(structure: MatricesStructure) -> OwnTerms | None:

@@ -11,14 +11,11 @@ from typing import Annotated, Any, Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.arrays import Complex, Flags, Integer, Real
 from solver.matrices.values import frozen
 from solver.scene.linear_terms import End
 
-FloatArray = NDArray[np.float64]
-Integer = NDArray[np.int64]
-Flags = NDArray[np.bool_]
-Complex = NDArray[np.complex128]
-Blocks = tuple[tuple[int, FloatArray], ...]  # offsets between sectors, and a matrix for each
+Blocks = tuple[tuple[int, Real], ...]  # offsets between sectors, and a matrix for each
 
 _Kept = TypeVar("_Kept")
 
@@ -76,7 +73,7 @@ class ForceTerm:
     """One force amplitude * cos(harmonic * omega t + phase) along `vector`."""
 
     vector: Annotated[
-        FloatArray | Complex, "Selects the DOF, (n,); complex where several have phases of their own."
+        Real | Complex, "Selects the DOF, (n,); complex where several have phases of their own."
     ]
     amplitude: Annotated[float, "Force [N]."]
     phase: Annotated[float, "Phase [rad]."]
@@ -97,7 +94,7 @@ class Coordinates:
     """What extra terms are written in."""
 
     dofs: Annotated[tuple[str, ...], "Names of the DOFs."]
-    shapes: Annotated[FloatArray, "The DOFs in the coordinates of the matrices, (n_dofs, n)."]
+    shapes: Annotated[Real, "The DOFs in the coordinates of the matrices, (n_dofs, n)."]
     direct: Annotated[bool, "Whether they are these coordinates themselves, as of a lumped structure."] = (
         False
     )
@@ -110,7 +107,7 @@ class Coordinates:
         """Return rows over the DOFs as rows over the coordinates; read-only."""
         return selected if self.direct else frozen(selected @ self.shapes)
 
-    def at(self, end: End) -> FloatArray:
+    def at(self, end: End) -> Real:
         """Return a DOF, or a sum of them or of rows of the matrices, as a row over the coordinates (n,)."""
         if isinstance(end, str):
             return np.asarray(self.shapes[self.dofs.index(end)])
@@ -148,7 +145,7 @@ class ExtraTerms:
     offsets: Annotated[tuple[int, ...], "Sectors ahead; (0,) of a structure without sectors."]
     K: Annotated[Complex, "Complex stiffness [N/m], (m, n, n)."]
     C: Annotated[Complex, "Complex damping [N s/m], (m, n, n)."]
-    still: Annotated[FloatArray | None, "Stiffness of the mean alone [N/m], (n, n)."] = None
+    still: Annotated[Real | None, "Stiffness of the mean alone [N/m], (n, n)."] = None
     loss_factor: Annotated[float, "The symmetric stiffness times i and this belongs to it too."] = 0.0
     lossy: Annotated[
         Terms | None, "Those whose stiffness it is; None: of the terms beside which these stand."
@@ -199,11 +196,11 @@ class Terms:
     """
 
     sectors: Annotated[int, "Number of sectors, 1 if lumped."]
-    M: Annotated[FloatArray, "Mass [kg], (n, n)."]
-    C0: Annotated[FloatArray, "Damping [N s/m], (n, n)."]
-    Cp: Annotated[FloatArray, "Damping that couples to the next sector [N s/m], (n, n); 0 if lumped."]
-    K0: Annotated[FloatArray, "Stiffness [N/m], (n, n)."]
-    Kp: Annotated[FloatArray, "Stiffness that couples to the next sector [N/m], (n, n); 0 if lumped."]
+    M: Annotated[Real, "Mass [kg], (n, n)."]
+    C0: Annotated[Real, "Damping [N s/m], (n, n)."]
+    Cp: Annotated[Real, "Damping that couples to the next sector [N s/m], (n, n); 0 if lumped."]
+    K0: Annotated[Real, "Stiffness [N/m], (n, n)."]
+    Kp: Annotated[Real, "Stiffness that couples to the next sector [N/m], (n, n); 0 if lumped."]
     sector: Annotated[Source | None, "What the matrices are at each nodal diameter, in place of these."] = (
         None
     )
@@ -233,7 +230,7 @@ class Terms:
             return K, C, M
         turn = self.turns(diameters)[:, None, None]
 
-        def turned(zero: FloatArray, plus: FloatArray) -> NDArray[Any]:
+        def turned(zero: Real, plus: Real) -> NDArray[Any]:
             if not np.any(plus):
                 return np.broadcast_to(zero, (len(turn), *zero.shape))
             ahead = plus * turn
@@ -311,20 +308,20 @@ class LinearModel(Terms):
 
     dofs: Annotated[tuple[str, ...], "Names of the DOFs."]
     shapes: Annotated[
-        FloatArray,
+        Real,
         "The DOFs in the coordinates of the matrices, (n_dofs, n): the identity, or what a structure given "
         "by matrices or modes names.",
     ]
     contact_here: Annotated[
-        FloatArray,
+        Real,
         "L(theta) = contact_here + contact_next e^{j theta}, (n_ports, n); u = L x, x the coordinates.",
     ]
-    contact_next: Annotated[FloatArray, "Its part in the next sector, (n_ports, n)."]
+    contact_next: Annotated[Real, "Its part in the next sector, (n_ports, n)."]
     stiffnesses: Annotated[
-        FloatArray, "What holds each motion when the contact is closed and stuck [N/m], (n_ports,)."
+        Real, "What holds each motion when the contact is closed and stuck [N/m], (n_ports,)."
     ]
     forces: Annotated[tuple[ForceTerm, ...], "The excitation."]
-    observe: Annotated[FloatArray, "Selects the observed DOF, (n,)."]
+    observe: Annotated[Real, "Selects the observed DOF, (n,)."]
     engine_order: Annotated[int, "Engine order of the excitation, 0 if lumped."]
     every_diameter: Annotated[bool, "Whether the matrices of all nodal diameters are known."] = True
     prescribed: Annotated[
@@ -349,7 +346,7 @@ class LinearModel(Terms):
         return 2.0 * math.pi * self.engine_order / self.sectors
 
     @property
-    def port_stiffnesses(self) -> FloatArray:
+    def port_stiffnesses(self) -> Real:
         """A finite stiffness > 0 of every port [N/m]: its own, or one of the size of the structure's."""
         own, K = self.stiffnesses, self.K0 if self.sector is None else self.sector.at(self.engine_order)[0]
         return np.where((own > 0.0) & np.isfinite(own), own, float(np.abs(K).max(initial=0.0)) or 1.0)
@@ -417,9 +414,9 @@ class LinearModelDerivative(Terms):
         bool, "The matrices are affine in this parameter, so these derivatives are constant."
     ] = True
     contact_here: Annotated[
-        FloatArray | None, "Derivative of that matrix, (n_ports, n); None where it does not depend on it."
+        Real | None, "Derivative of that matrix, (n_ports, n); None where it does not depend on it."
     ] = None
-    contact_next: Annotated[FloatArray | None, "Likewise, (n_ports, n)."] = None
+    contact_next: Annotated[Real | None, "Likewise, (n_ports, n)."] = None
     forces: Annotated[tuple[ForceTerm, ...], "First derivatives of the forces [N per unit]."] = ()
     second_forces: Annotated[tuple[ForceTerm, ...], "Second ones [N per unit squared]."] = ()
     second_extra: Annotated[ExtraTerms | None, "Second derivatives of the extra terms."] = None

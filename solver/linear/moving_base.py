@@ -16,17 +16,14 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from solver.arrays import Complex, Integer, Real
 from solver.errors import SettingError
 from solver.linear.model import ExtraTerms, ForceTerm, LinearModel, LinearModelDerivative, Terms
 from solver.matrices.values import frozen
 from solver.scene.excitation import Motion
 from solver.scene.scene import Scene
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
 _WHOLE, _MOVING = np.zeros(1, np.int64), np.ones(1, np.bool_)  # a structure without sectors, in motion
 _RIGID = 1e20  # stiffness of what drives a DOF, relative to the largest of the structure
 

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.arrays import Real
 from solver.contacts.fields import Between, parse_end
 from solver.errors import SettingError
 from solver.matrices.normal_modes import hermitian, undamped_modes
@@ -24,7 +25,6 @@ from solver.scene.bodies.body import Body
 from solver.scene.cyclic.sector_blocks import at_diameter, full_elimination
 from solver.scene.matrices_structure import MatricesStructure, Ratios
 
-FloatArray = NDArray[np.float64]
 _SAME = 1e-9  # relative distance of two squared frequencies below which their quotient is a derivative
 
 
@@ -42,11 +42,11 @@ class Elements(NamedTuple):
 class Matrices(NamedTuple):
     """Mass, damping and stiffness of a sector; p: to the next one."""
 
-    M: FloatArray
-    C0: FloatArray
-    Cp: FloatArray
-    K0: FloatArray
-    Kp: FloatArray
+    M: Real
+    C0: Real
+    Cp: Real
+    K0: Real
+    Kp: Real
 
 
 def _assembled(elements: Elements) -> Matrices:
@@ -64,7 +64,7 @@ def _assembled(elements: Elements) -> Matrices:
     return Matrices(M, C0, Cp, K0, Kp)
 
 
-def _join(X0: FloatArray, Xp: FloatArray, ends: Between, value: float, index: dict[str, int]) -> None:
+def _join(X0: Real, Xp: Real, ends: Between, value: float, index: dict[str, int]) -> None:
     """Add one spring or dashpot between two ends to X0 + Xp e^{j theta} + Xp^T e^{-j theta}."""
     first, second = map(parse_end, ends)
     here = [index[end.dof] for end in (first, second) if end.dof is not None]
@@ -117,7 +117,7 @@ def slopes_of_elements(elements: Elements, gains: tuple[tuple[int, float], ...])
     return Matrices(*map(frozen, found)), elements.ratios is None or not moved
 
 
-def ratio_of_modes(ratios: Ratios, count: int) -> FloatArray:
+def ratio_of_modes(ratios: Ratios, count: int) -> Real:
     """Return the damping ratio of each of `count` modes: the last one given also of those above it."""
     given = np.atleast_1d(np.asarray(ratios, dtype=np.float64))
     return np.asarray(given[np.minimum(np.arange(count), given.size - 1)])
@@ -135,9 +135,7 @@ def modal_damping(M: NDArray[Any], K: NDArray[Any], ratios: Ratios) -> NDArray[A
     return np.asarray((momenta * (2.0 * zeta * omega)) @ momenta.conj().T)
 
 
-def modal_damping_derivative(
-    M: FloatArray, K: FloatArray, ratios: Ratios, dM: FloatArray, dK: FloatArray
-) -> FloatArray:
+def modal_damping_derivative(M: Real, K: Real, ratios: Ratios, dM: Real, dK: Real) -> Real:
     """Return the derivative of `modal_damping` where M and K change by dM and dK.
 
     With φᵀMφ = 1, C = Mφ F φᵀM, F = 2ζω: modes turn into each other, φ' = φB with B_ij =
@@ -172,14 +170,12 @@ def modal_damping_derivative(
 
 
 @lru_cache(maxsize=64)
-def bodies_mass(n: int, bodies: tuple[Body, ...]) -> FloatArray:
+def bodies_mass(n: int, bodies: tuple[Body, ...]) -> Real:
     """Mass matrix of the bodies behind `n` DOFs of the structure, which have none of it; read-only."""
     return frozen(block_diag(np.zeros((n, n)), *(body.mass_matrix() for body in bodies)))
 
 
-def mass_of_bodies(
-    n: int, bodies: tuple[Body, ...], masses: Mapping[str, FloatArray], behind: int = 0
-) -> FloatArray:
+def mass_of_bodies(n: int, bodies: tuple[Body, ...], masses: Mapping[str, Real], behind: int = 0) -> Real:
     """Mass matrices of bodies by their names as one of `n` coordinates, `behind` after theirs; read-only."""
     blocks = [masses.get(body.name, np.zeros((len(body.dofs),) * 2)) for body in bodies]
     own = n - behind - sum(map(len, blocks))

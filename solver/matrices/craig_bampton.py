@@ -21,12 +21,12 @@ from scipy import linalg
 from scipy.sparse import coo_array, csc_array
 from scipy.sparse.linalg import ArpackError, LinearOperator, cg, eigsh, splu
 
+from solver.arrays import Real
 from solver.errors import FieldError
 from solver.matrices.diagnostics import rigid_body_modes
 from solver.matrices.matrix_validation import DofTable, one_triangle
 from solver.matrices.values import ASYMMETRY, MOST_DOFS, MOST_MODES
 
-FloatArray = NDArray[np.float64]
 Array = NDArray[Any]  # real, or complex where the matrices are Hermitian
 
 DENSE = 600  # rows below which all modes are found at once
@@ -122,7 +122,7 @@ def _lowest_estimate(rest: Interior) -> float:
     return float(np.vdot(shape, rest.K @ shape).real) / inertia if inertia > 0.0 else np.inf
 
 
-def held_modes(rest: Interior, count: int | None, up_to_hz: float | None) -> tuple[FloatArray, Array]:
+def held_modes(rest: Interior, count: int | None, up_to_hz: float | None) -> tuple[Real, Array]:
     """The lowest modes of the rest with the DOFs in use held.
 
     Parameters
@@ -161,7 +161,7 @@ def held_modes(rest: Interior, count: int | None, up_to_hz: float | None) -> tup
     return values[:kept], modes[:, :kept]
 
 
-def _lowest(rest: Interior, count: int) -> tuple[FloatArray, Array]:
+def _lowest(rest: Interior, count: int) -> tuple[Real, Array]:
     n = rest.K.shape[0]
     if not count:
         return np.zeros(0), np.zeros((n, 0))
@@ -185,16 +185,14 @@ GOOD = 1e-3  # relative error of a frequency that is still called good
 class Quality:
     """What was kept and what it is worth."""
 
-    held_hz: Annotated[FloatArray, "Frequencies of the modes kept, the DOFs in use held [Hz], (m,)."]
+    held_hz: Annotated[Real, "Frequencies of the modes kept, the DOFs in use held [Hz], (m,)."]
     effective_mass: Annotated[
-        FloatArray,
+        Real,
         "Share of the inertia of the rest, when one DOF in use is moved, that each mode carries, (m, "
         "n_kept); (m, 0) where it was not asked for.",
     ]
-    system_hz: Annotated[FloatArray, "Frequencies of the reduced model without contacts [Hz], (n,)."]
-    system_error: Annotated[
-        FloatArray, "Estimated relative error of each, (n,); infinite above the modes kept."
-    ]
+    system_hz: Annotated[Real, "Frequencies of the reduced model without contacts [Hz], (n,)."]
+    system_error: Annotated[Real, "Estimated relative error of each, (n,); infinite above the modes kept."]
     good_to_hz: Annotated[float, "Frequency up to which every error is below `GOOD` [Hz]."]
     static_residual: Annotated[
         float, "Forces left over by the static solutions, relative: how exact the static stiffness is."
@@ -203,13 +201,13 @@ class Quality:
     shift_hz: Annotated[float, "sqrt(−σ) / 2π of the shift that a free rest needed, else 0 [Hz]."]
 
     @property
-    def mass_carried(self) -> FloatArray:
+    def mass_carried(self) -> Real:
         """Share of the inertia of the rest that all modes carry, for each DOF in use."""
         return np.asarray(self.effective_mass.sum(axis=0))
 
 
 def measured(
-    held: Interior, values: FloatArray, modes: Array, matrices: dict[str, Array], *, weigh: bool = True
+    held: Interior, values: Real, modes: Array, matrices: dict[str, Array], *, weigh: bool = True
 ) -> Quality:
     """Measure a reduction.
 
@@ -236,7 +234,7 @@ def measured(
     )
 
 
-def _modes(matrices: dict[str, Array]) -> tuple[FloatArray, Array]:
+def _modes(matrices: dict[str, Array]) -> tuple[Real, Array]:
     """λ, ascending, and mass-normalised shapes of the reduced model."""
     try:
         lambdas, shapes = linalg.eigh(matrices["K"], matrices["M"])
@@ -248,9 +246,7 @@ def _modes(matrices: dict[str, Array]) -> tuple[FloatArray, Array]:
     return np.asarray(lambdas), np.asarray(shapes)
 
 
-def _errors(
-    held: Interior, values: FloatArray, modes: Array, lambdas: FloatArray, shapes: Array
-) -> FloatArray:
+def _errors(held: Interior, values: Real, modes: Array, lambdas: Real, shapes: Array) -> Real:
     kept = held.follow.shape[1]
     errors = np.full(lambdas.size, math.inf)
     if not held.K.shape[0] or values.size == held.K.shape[0]:
@@ -270,7 +266,7 @@ def _errors(
     return errors
 
 
-def _effective_mass(held: Interior, modes: Array) -> FloatArray:
+def _effective_mass(held: Interior, modes: Array) -> Real:
     pushed = held.M @ held.follow + held.couplings["M"]
     carried = np.abs(modes.conj().T @ pushed) ** 2
     diagonal = held.M.diagonal().real

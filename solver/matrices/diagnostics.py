@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
+from solver.arrays import Real
 from solver.errors import FieldError
 from solver.matrices.load_set import MatrixSet
 from solver.matrices.matrix_validation import one_triangle
 from solver.matrices.sectors.elimination import Elimination
 from solver.matrices.values import ASYMMETRY
 
-FloatArray = NDArray[np.float64]
 _RIGID = 1e-3  # a frequency below this share of the next one counts as zero
 _BODY = 6
 _SLOW, _FAST = 0.1, 3e5  # Hz; a first elastic frequency outside is hardly that of a machine part
@@ -80,7 +80,7 @@ def refuse(found: MatrixSet, *, reduced: bool, gone: Elimination | None = None) 
         )
 
 
-def _diagonals(found: MatrixSet, mass: FloatArray, stiffness: FloatArray) -> None:
+def _diagonals(found: MatrixSet, mass: Real, stiffness: Real) -> None:
     """Raise for masses and stiffnesses on the diagonal that cannot be."""
     at = int(mass.argmin())
     if mass[at] < 0.0:
@@ -138,7 +138,7 @@ def _least(M: Any) -> float:
         return float(min(error.eigenvalues, default=0.0))
 
 
-def rigid_body_modes(omega2: FloatArray) -> int:
+def rigid_body_modes(omega2: Real) -> int:
     """How many of the lowest ω² are zero but for rounding: those below a wide gap."""
     size = np.sort(np.abs(omega2))
     for count in range(min(_BODY, size.size - 1), 0, -1):
@@ -147,7 +147,7 @@ def rigid_body_modes(omega2: FloatArray) -> int:
     return 0
 
 
-def notes(found: MatrixSet, omega2: FloatArray) -> list[str]:
+def notes(found: MatrixSet, omega2: Real) -> list[str]:
     """What looks wrong, or should be known, about a structure with the natural frequencies √ω².
 
     Parameters

@@ -21,8 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
+from solver.arrays import Integer, Real
 from solver.matrices.decks.deck import Deck, positions
-from solver.matrices.sectors.elements import Integer, faces_of
+from solver.matrices.sectors.elements import faces_of
 
 _NEAR = 0.01  # share of the least distance of two nodes of a face within which nodes are one place
 _FLAT = 1e-3  # a face thinner than this share of its length is a line
@@ -168,7 +169,6 @@ def _lengths(along: NDArray[np.float64]) -> NDArray[np.float64]:
     return lengths
 
 
-Real = NDArray[np.float64]
 _LEAST = 1e-6  # share of a facet below which what covers it is rounding: decks have some six digits
 _SMALL = 1e-12  # of the largest weight
 _STEPS = 30  # of Newton's method for a place in a quadrangle

@@ -13,11 +13,11 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.arrays import Real
 from solver.jit import eigen
 
 # Not that of `solver.jit.fourier`, which brings the compiled loops along: files of strangers are read
 # without.
-Real = NDArray[np.float64]
 SMALL_PIVOT = 1e-12  # of the scaled K: below it K alone may be singular, and is shifted
 SHIFT = 1e-10  # shift σ relative to the largest K_ii / M_ii
 LEAST = 1e-16  # smallest flexibility relative to the largest: below is rounding, only the static share counts

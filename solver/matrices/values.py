@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
+from solver.arrays import Real
+
 # Forces over displacements, and moments over angles, in the units of the files: what they are in N/m and
 # N m. Masses go with them, as seconds stay seconds: t, mm, N and lbf s²/in, in, lbf are consistent units.
 UNITS = {"SI": (1.0, 1.0), "mm": (1e3, 1e-3), "in": (4.4482216152605 / 0.0254, 4.4482216152605 * 0.0254)}
@@ -23,7 +25,6 @@ METRES = {"SI": 1.0, "mm": 1e-3, "in": 0.0254}
 """The length of each."""
 
 
-FloatArray = NDArray[np.float64]
 ArrayOf = TypeVar("ArrayOf", bound=NDArray[Any])
 MOST_DOFS = 2000
 ASYMMETRY = 1e-8  # largest difference from the transpose, relative to the largest entry, taken for rounding
@@ -95,7 +96,7 @@ def frozen(array: ArrayOf) -> ArrayOf:
     return array
 
 
-def _real(array: Any) -> FloatArray:
+def _real(array: Any) -> Real:
     return np.ascontiguousarray(array, dtype=np.float64)
 
 
@@ -103,7 +104,7 @@ def _real(array: Any) -> FloatArray:
 class Matrix(ByContent):
     """A square matrix of a scene; equal to another with the same entries."""
 
-    array: Annotated[FloatArray, "Read-only, (n, n)."]
+    array: Annotated[Real, "Read-only, (n, n)."]
     digest: Annotated[str, "Hash of the content."] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -183,9 +184,9 @@ class Matrix(ByContent):
 class NormalModes(ByContent):
     """Mass-normalised modes of a structure: q'' + 2 ζ ω q' + ω² q = φᵀ f, x = φ q."""
 
-    omega2: Annotated[FloatArray, "Squares of the natural frequencies [rad²/s²], (m,); 0 of a rigid body."]
-    modes: Annotated[FloatArray, "One mode a column, φᵀ M φ = 1 [kg^-1/2], (n, m)."]
-    damping_ratio: Annotated[FloatArray | None, "ζ of each mode, (m,)."] = None
+    omega2: Annotated[Real, "Squares of the natural frequencies [rad²/s²], (m,); 0 of a rigid body."]
+    modes: Annotated[Real, "One mode a column, φᵀ M φ = 1 [kg^-1/2], (n, m)."]
+    damping_ratio: Annotated[Real | None, "ζ of each mode, (m,)."] = None
     digest: Annotated[str, "Hash of the content."] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -243,7 +244,7 @@ class NormalModes(ByContent):
         return cls.of({**arrays, "modes": _rows(data["modes"], "`modes`", MOST_DOFS)})
 
     @classmethod
-    def of(cls, arrays: dict[str, FloatArray]) -> NormalModes:
+    def of(cls, arrays: dict[str, Real]) -> NormalModes:
         """Modes from the arrays of a file or a table, under the keys of the table."""
         omega2 = arrays["omega2"] if "omega2" in arrays else (2.0 * np.pi * arrays["frequencies_hz"]) ** 2
         if "frequencies_hz" in arrays and np.any(arrays["frequencies_hz"] < 0.0):
@@ -270,7 +271,7 @@ def _plain(item: Any) -> Any:
     return item.write() if hasattr(item, "write") else item
 
 
-def _numbers(data: object, what: str) -> FloatArray:
+def _numbers(data: object, what: str) -> Real:
     """A number or a list of numbers; texts, truth values and nested lists are refused."""
     listed = data if isinstance(data, list | tuple) else [data]
     for i, value in enumerate(listed):
@@ -282,7 +283,7 @@ def _numbers(data: object, what: str) -> FloatArray:
         raise ValueError(f"{what} must be finite, got a whole number too large for it") from None
 
 
-def _rows(data: object, what: str, most: int) -> FloatArray:
+def _rows(data: object, what: str, most: int) -> Real:
     if (
         not isinstance(data, list | tuple)
         or not all(isinstance(row, list | tuple) for row in data)
@@ -298,7 +299,7 @@ def _rows(data: object, what: str, most: int) -> FloatArray:
     return np.array([_numbers(row, f"{what}, row {i},") for i, row in enumerate(data)]).reshape(-1, width)
 
 
-def _entries(data: dict[str, object]) -> FloatArray:
+def _entries(data: dict[str, object]) -> Real:
     if set(data) != set(_ENTRY_KEYS):
         got = ", ".join(sorted(map(str, data)))[:200]
         raise ValueError(f"a matrix given by its entries has the keys {', '.join(_ENTRY_KEYS)}, got {got}")

@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from solver.arrays import Real
 from solver.errors import SceneError, SettingError
 
-Real = NDArray[np.float64]
 KEYS = {"quadratic": 3, "cubic": 4}
 """The tensors with their numbers of indices."""
 _SYMMETRIC = 1e-6  # of the largest entry: less is what a file of seven digits leaves

@@ -12,8 +12,9 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.arrays import Integer, Real
 from solver.matrices.readers.numbers_in_text import FormatError, fortran_real
-from solver.matrices.sectors.elements import ElementShape, Integer
+from solver.matrices.sectors.elements import ElementShape
 
 _DEEPEST = 10  # files that include each other
 _MOST_MEMBERS = 2_000_000
@@ -95,7 +96,7 @@ class Deck:
     ] = field(default_factory=dict)
 
 
-def positions(deck: Deck, nodes: Sequence[int]) -> FloatArray:
+def positions(deck: Deck, nodes: Sequence[int]) -> Real:
     """Positions of nodes, (n, 3).
 
     Raises
@@ -109,7 +110,7 @@ def positions(deck: Deck, nodes: Sequence[int]) -> FloatArray:
     return np.array([deck.nodes[node] for node in nodes], dtype=np.float64).reshape(-1, 3)
 
 
-def frames(deck: Deck, nodes: Sequence[int]) -> FloatArray:
+def frames(deck: Deck, nodes: Sequence[int]) -> Real:
     """The axes of nodes as columns, (n, 3, 3).
 
     Raises
@@ -135,7 +136,6 @@ def frames(deck: Deck, nodes: Sequence[int]) -> FloatArray:
     return found
 
 
-FloatArray = NDArray[np.float64]
 Vector = Sequence[float] | NDArray[Any]
 _NONE = 1e-9  # share of a length that counts as none
 
@@ -153,10 +153,10 @@ class CoordinateSystem:
     """A coordinate system."""
 
     kind: CoordinateKind
-    origin: Annotated[FloatArray, "In the global system, (3,)."]
-    axes: Annotated[FloatArray, "Directions of x, y and z as columns, orthonormal and right-handed, (3, 3)."]
+    origin: Annotated[Real, "In the global system, (3,)."]
+    axes: Annotated[Real, "Directions of x, y and z as columns, orthonormal and right-handed, (3, 3)."]
 
-    def places(self, given: FloatArray) -> FloatArray:
+    def places(self, given: Real) -> Real:
         """Places (n, 3) in the global system of the numbers (n, 3) that tell them in this one."""
         local = given
         if self.kind is CoordinateKind.CYLINDRICAL:
@@ -168,7 +168,7 @@ class CoordinateSystem:
             local = np.stack([across * np.cos(angle), across * np.sin(angle), r * np.cos(polar)], axis=1)
         return np.asarray(self.origin + local @ self.axes.T)
 
-    def frames(self, places: FloatArray) -> FloatArray:
+    def frames(self, places: Real) -> Real:
         """The axes of nodes at global places (n, 3) as columns, (n, 3, 3); NaN where they are not known.
 
         On the axis of a cylinder, and of a sphere, a radius has no direction.
@@ -190,7 +190,7 @@ class CoordinateSystem:
             columns = [[sin * c, sin * s, cos], [cos * c, cos * s, -sin], about]
         return np.asarray(self.axes @ np.array(columns).transpose(2, 1, 0))
 
-    def moved(self, turn: FloatArray, shift: FloatArray) -> CoordinateSystem:
+    def moved(self, turn: Real, shift: Real) -> CoordinateSystem:
         """The system after a rotation (3, 3) of the whole space about the origin and then a shift (3,)."""
         return CoordinateSystem(self.kind, turn @ self.origin + shift, turn @ self.axes)
 
@@ -198,7 +198,7 @@ class CoordinateSystem:
 GLOBAL = CoordinateSystem(CoordinateKind.RECTANGULAR, np.zeros(3), np.eye(3))
 
 
-def axes_by(first: int, along: Vector, second: int, beside: Vector) -> FloatArray:
+def axes_by(first: int, along: Vector, second: int, beside: Vector) -> Real:
     """Axes (3, 3) of which one lies along a vector, and another on the side of a second vector.
 
     Parameters
@@ -227,13 +227,13 @@ def axes_by(first: int, along: Vector, second: int, beside: Vector) -> FloatArra
     return axes
 
 
-def around(axis: Vector) -> FloatArray:
+def around(axis: Vector) -> Real:
     """Axes (3, 3) with z along a vector, x and y anywhere: of a cylinder whose angles nobody asks for."""
     z = np.asarray(axis, dtype=np.float64)
     return axes_by(2, z, 0, np.eye(3)[int(np.argmin(np.abs(z)))])
 
 
-def rotation(axis: Vector, angle: float) -> FloatArray:
+def rotation(axis: Vector, angle: float) -> Real:
     """The rotation by an angle [rad] about an axis through the origin, (3, 3) (Rodrigues)."""
     k = np.asarray(axis, dtype=np.float64)
     k = k / np.linalg.norm(k)
@@ -241,7 +241,7 @@ def rotation(axis: Vector, angle: float) -> FloatArray:
     return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross))
 
 
-def ansys_axes(xy: float, yz: float, zx: float) -> FloatArray:
+def ansys_axes(xy: float, yz: float, zx: float) -> Real:
     """Axes (3, 3) turned by Ansys' angles [degrees]: about z, then about the new x, then about the new y."""
     z, x, y = (
         rotation(axis, math.radians(angle))

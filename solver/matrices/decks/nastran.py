@@ -12,16 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from solver.matrices.decks.deck import (
-    GLOBAL,
-    CoordinateKind,
-    CoordinateSystem,
-    Deck,
-    DeckFile,
-    FloatArray,
-    axes_by,
-    real,
-)
+from solver.arrays import Real
+from solver.matrices.decks.deck import GLOBAL, CoordinateKind, CoordinateSystem, Deck, DeckFile, axes_by, real
 from solver.matrices.readers.numbers_in_text import FormatError
 
 _KINDS = {"R": CoordinateKind.RECTANGULAR, "C": CoordinateKind.CYLINDRICAL, "S": CoordinateKind.SPHERICAL}
@@ -51,7 +43,7 @@ class BulkEntry:
 class _Bulk:
     """What the bulk data say of nodes, as they say it."""
 
-    grids: dict[int, tuple[int, FloatArray, int]] = field(default_factory=dict)  # CP, numbers, CD
+    grids: dict[int, tuple[int, Real, int]] = field(default_factory=dict)  # CP, numbers, CD
     cords: dict[int, BulkEntry] = field(default_factory=dict)
     known: dict[int, CoordinateSystem] = field(default_factory=lambda: {_BASIC: GLOBAL})
     open: list[int] = field(default_factory=list)  # systems that are being looked up
@@ -68,7 +60,7 @@ class _Bulk:
             self.open.pop()
         return self.known[number]
 
-    def place(self, node: int) -> FloatArray:
+    def place(self, node: int) -> Real:
         if node not in self.grids:
             raise FormatError(f"there is no GRID {node}, by which a coordinate system is defined")
         cp, numbers, _ = self.grids[node]

@@ -15,10 +15,8 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.arrays import Integer, Real
 from solver.matrices.readers.numbers_in_text import FormatError
-
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 # C3D20R, C3D10MH; S4, S8R, S4R5.
 _KIND = re.compile(r"C3D(?P<solid>[0-9]+)[A-Z]*|S(?P<shell>[0-9])(R|RS|RSW|R5|T|RT)?")

@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 
 from solver.matrices.decks.deck import rotation as rotation
 
-FloatArray = NDArray[np.float64]
 Group = tuple[int, ...]  # rows of a vector's three components (-1: held), or the one row of a scalar
 _LEFT = 1e-9  # component of a turned displacement that counts as none where a boundary condition holds it
 

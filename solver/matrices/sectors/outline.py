@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.arrays import Integer, Real
 from solver.matrices.sectors.elements import drawn_edges
 from solver.matrices.values import ByContent
 
@@ -27,9 +28,6 @@ MOVED = "moved"
 _MOST_LOOSE = 1_500  # nodes of a mesh without elements
 _MOST_OF_A_BOUNDARY = 400
 _DIGITS = 5  # of a place, relative to the size of the sector: enough for a drawing
-
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

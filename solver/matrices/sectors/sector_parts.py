@@ -10,11 +10,11 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.arrays import Complex
 from solver.errors import SettingError
 from solver.matrices.sectors.outline import OutlineMotion
 from solver.matrices.values import MOST_DOFS, ByContent, Matrix, Named, differs
 
-ComplexArray = NDArray[np.complex128]
 WHOLE = ("K", "M")  # names for the stiffness and the mass of a whole sector
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,80}")
 
@@ -72,8 +72,8 @@ class PartsAcross(ByContent):
     """
 
     names: Annotated[tuple[str, ...], "Tuple of str."]
-    ahead: Annotated[ComplexArray, "T(a)ᴴ P T(b), (n_parts, nd, nd, n, n)."]
-    back: Annotated[ComplexArray, "T(a)ᴴ P T(−b), (n_parts, nd, nd, n, n)."]
+    ahead: Annotated[Complex, "T(a)ᴴ P T(b), (n_parts, nd, nd, n, n)."]
+    back: Annotated[Complex, "T(a)ᴴ P T(−b), (n_parts, nd, nd, n, n)."]
     digest: Annotated[str, "Hash of the content."] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -113,7 +113,7 @@ class PartsAcross(ByContent):
             return data
         if not isinstance(data, dict) or not data:
             raise ValueError("`parts` must be a table by the names of the parts")
-        stacks: dict[str, list[ComplexArray]] = {"ahead": [], "back": []}
+        stacks: dict[str, list[Complex]] = {"ahead": [], "back": []}
         for name, table in data.items():
             if not isinstance(table, dict) or set(table) != set(stacks):
                 raise ValueError(f"`parts`: {str(name)[:80]!r} must be a table with `ahead` and `back`")
@@ -136,7 +136,7 @@ class PartsAcross(ByContent):
         }
 
 
-def _numbers(key: str, item: Any) -> ComplexArray:
+def _numbers(key: str, item: Any) -> Complex:
     if not isinstance(item, dict) or set(item) != {"real", "imag"}:
         raise ValueError(f"`parts`: `{key}` must be a table with `real` and `imag`")
     try:
@@ -163,9 +163,9 @@ class DiameterMatrices(ByContent):
         tuple[int, ...],
         "Ascending, each from 0 to half the number of sectors; that of n backward is the complex conjugate.",
     ]
-    M: Annotated[ComplexArray, "Hermitian and read-only, (nd, n, n)."]
-    K: Annotated[ComplexArray, "As M."]
-    C: Annotated[ComplexArray | None, "(nd, n, n)."] = None
+    M: Annotated[Complex, "Hermitian and read-only, (nd, n, n)."]
+    K: Annotated[Complex, "As M."]
+    C: Annotated[Complex | None, "(nd, n, n)."] = None
     parts: Annotated[PartsAcross | None, "Parts that mistuning may scale, between the nodal diameters."] = (
         None
     )
@@ -274,13 +274,13 @@ class DiameterMatrices(ByContent):
         return table
 
 
-def _stack(key: str, data: object, count: int) -> ComplexArray:
+def _stack(key: str, data: object, count: int) -> Complex:
     if not isinstance(data, list | tuple) or len(data) != count:
         raise ValueError(f"`{key}` must have a table `real`, `imag` for each of the {count} nodal diameters")
     return np.array([_complex(key, item) for item in data])
 
 
-def _complex(key: str, item: Any) -> ComplexArray:
+def _complex(key: str, item: Any) -> Complex:
     if not isinstance(item, dict) or not {"real"} <= set(item) <= {"real", "imag"}:
         raise ValueError(f"`{key}` must hold tables with the keys `real` and `imag`")
     real = Matrix.read(item["real"]).array
@@ -290,7 +290,7 @@ def _complex(key: str, item: Any) -> ComplexArray:
     return np.asarray(real + 1j * imag, dtype=np.complex128)
 
 
-def _written(matrix: ComplexArray) -> dict[str, object]:
+def _written(matrix: Complex) -> dict[str, object]:
     table: dict[str, object] = {"real": Matrix(matrix.real).write()}
     if np.any(matrix.imag):
         table["imag"] = Matrix(matrix.imag).write()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.arrays import Real
 from solver.errors import SettingError
 from solver.matrices.sectors.elimination import Circulant, Elimination, elimination
 from solver.matrices.sectors.sector_parts import WHOLE, PartsAcross
@@ -16,7 +17,6 @@ from solver.matrices.sectors.sector_parts import WHOLE, PartsAcross
 if TYPE_CHECKING:
     from solver.scene.matrices_structure import MatricesStructure
 
-FloatArray = NDArray[np.float64]
 Matrices = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
 
 
@@ -37,7 +37,7 @@ def _circulants(sector: MatricesStructure) -> tuple[Circulant, Circulant, Circul
     return K, C, M
 
 
-def _given(sector: MatricesStructure) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _given(sector: MatricesStructure) -> tuple[Real, Real, Real]:
     """K, C and M as they stand in the scene; no damping is 0."""
     if sector.M is None or sector.K is None:
         raise ValueError("a structure given by its matrices needs M and K")
@@ -115,7 +115,7 @@ def scalable(sector: MatricesStructure) -> tuple[str, ...]:
 
 def added_by_mistuning(
     sector: MatricesStructure, of: Sequence[str], factors: Sequence[float]
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[Real, Real]:
     """What factors on parts of each sector add to K and M of all sectors, sector after sector.
 
     Parameters
@@ -150,7 +150,7 @@ def _size(sector: MatricesStructure) -> int:
     return sector.diameters.size if sector.diameters is not None else full_elimination(sector).kept.size
 
 
-def _sector_by_sector(sector: MatricesStructure, name: str, deviations: FloatArray) -> FloatArray:
+def _sector_by_sector(sector: MatricesStructure, name: str, deviations: Real) -> Real:
     """Add a part of a full sector: its high boundary is the low one of the next sector."""
     eliminated = full_elimination(sector)
     P = _matrix(sector, name)
@@ -167,7 +167,7 @@ def _sector_by_sector(sector: MatricesStructure, name: str, deviations: FloatArr
     return whole.reshape(count * n, count * n)
 
 
-def _matrix(sector: MatricesStructure, name: str) -> FloatArray:
+def _matrix(sector: MatricesStructure, name: str) -> Real:
     if name in WHOLE:
         given = sector.K if name == "K" else sector.M
         if given is None:
@@ -179,7 +179,7 @@ def _matrix(sector: MatricesStructure, name: str) -> FloatArray:
     return parts.matrices[parts.index(name)].array
 
 
-def _between_diameters(parts: PartsAcross, at: int, deviations: FloatArray) -> FloatArray:
+def _between_diameters(parts: PartsAcross, at: int, deviations: Real) -> Real:
     """Add a part of a reduced sector, which couples all nodal diameters (`PartsAcross`)."""
     count, n = deviations.size, parts.ahead.shape[3]
     spectrum = np.fft.fft(deviations).conj() / count  # 1/N Σ_j δ_j e^{i m j α}

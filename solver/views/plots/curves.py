@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.arrays import Real
 from solver.results.measures import OF_X, Measured
 
 if TYPE_CHECKING:
     from solver.continuation.branch import AnyBranch
 
-FloatArray = NDArray[np.float64]
 Intervals = tuple[tuple[float, float], ...]
 Marks = tuple[tuple[str, float, float], ...]  # kind, parameter value, amplitude [m]
 
@@ -24,8 +24,8 @@ class Response:
 
     scene: Annotated[str, "Its name."]
     parameter: Annotated[str, "Path of the parameter."]
-    values: Annotated[FloatArray, "Parameter values in user units, (P,)."]
-    amplitude: Annotated[FloatArray, "Of what is measured [m], (P,)."]
+    values: Annotated[Real, "Parameter values in user units, (P,)."]
+    amplitude: Annotated[Real, "Of what is measured [m], (P,)."]
     measured: Annotated[Measured, "What it is of."] = OF_X
     peak: Annotated[
         tuple[float, float] | None,
@@ -60,9 +60,9 @@ class Response:
 
 
 def with_peak(
-    values: FloatArray, amplitude: FloatArray, peak: tuple[float, float] | None,
+    values: Real, amplitude: Real, peak: tuple[float, float] | None,
     unstable: NDArray[np.bool_] | None = None,
-) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:  # fmt: skip
+) -> tuple[Real, Real, NDArray[np.bool_]]:  # fmt: skip
     """The points of a curve with its polished peak among them, where the neighbours enclose it."""
     unstable = np.zeros(values.size, bool) if unstable is None else unstable
     if peak is None or peak[1] <= amplitude.max():
@@ -80,7 +80,7 @@ def with_peak(
     )
 
 
-def above(values: FloatArray, amplitude: FloatArray, limit: float) -> Intervals:
+def above(values: Real, amplitude: Real, limit: float) -> Intervals:
     """Intervals of the parameter in which the polyline through the points is above a limit, ascending."""
     pieces = []
     for i in range(values.size - 1):

@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
+from solver.arrays import Real
 from solver.results import units
 from solver.results.measures import Measured
 from solver.views.plots import style
-from solver.views.plots.curves import FloatArray
 from solver.views.plots.style import Into
 from solver.views.plots.tracks import numbers
 
@@ -33,8 +33,8 @@ class Loop:
     """One contact over a period: slip motion [m] and friction force [N], (n,) each."""
 
     contact: str
-    slip: FloatArray
-    force: FloatArray
+    slip: Real
+    force: Real
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,12 +43,10 @@ class Motion:
 
     title: Annotated[str, "What it is of."]
     dof: Annotated[str, "The observed DOF."]
-    time: Annotated[FloatArray, "Instants from 0 to the end of the period [s], (n,)."]
-    displacement: Annotated[FloatArray, "Of the observed DOF [m], (n,)."]
+    time: Annotated[Real, "Instants from 0 to the end of the period [s], (n,)."]
+    displacement: Annotated[Real, "Of the observed DOF [m], (n,)."]
     loops: Annotated[tuple[Loop, ...], "One for each contact; of a cyclic scene, those of one sector."]
-    harmonics: Annotated[
-        FloatArray | None, "|mean| and the amplitudes of the observed DOF [m], (H + 1,)."
-    ] = None
+    harmonics: Annotated[Real | None, "|mean| and the amplitudes of the observed DOF [m], (H + 1,)."] = None
 
     @classmethod
     def of_solution(cls, solution: Solution) -> Self:
@@ -122,7 +120,7 @@ def motion_figure(motion: Motion, *, ax: Into = None) -> Figure:
     return page
 
 
-def harmonics_figure(heights: FloatArray, title: str, *, dof: str = "x", ax: Into = None) -> Figure:
+def harmonics_figure(heights: Real, title: str, *, dof: str = "x", ax: Into = None) -> Figure:
     """The harmonics alone, of a response whose motion is not known.
 
     Parameters
@@ -138,7 +136,7 @@ def harmonics_figure(heights: FloatArray, title: str, *, dof: str = "x", ax: Int
     return page
 
 
-def _draw_harmonics(axes: Axes, heights: FloatArray, dof: str, unit: units.LengthUnit) -> None:
+def _draw_harmonics(axes: Axes, heights: Real, dof: str, unit: units.LengthUnit) -> None:
     """Bars on a logarithmic scale; what is far below the largest is not drawn."""
     shown = np.where(heights >= _FAR_DOWN * np.nanmax(heights), heights, np.nan) * unit.per_metre
     axes.bar(np.arange(heights.size), shown, color=style.BLUE, width=0.7)
@@ -151,11 +149,11 @@ def _draw_harmonics(axes: Axes, heights: FloatArray, dof: str, unit: units.Lengt
     style.label(axes, "harmonic (0: mean)", f"amplitude of {dof} [{unit.name}]")
 
 
-def _loop(contact: str, slip: FloatArray, force: FloatArray) -> Loop:
+def _loop(contact: str, slip: Real, force: Real) -> Loop:
     return Loop(contact=contact, slip=_closed(slip), force=_closed(force))
 
 
-def _closed(samples: FloatArray) -> FloatArray:
+def _closed(samples: Real) -> Real:
     """Samples of a period with the first repeated at its end."""
     return np.append(samples, samples[:1])
 

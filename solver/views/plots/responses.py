@@ -11,11 +11,12 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from solver.arrays import Real
 from solver.results import units
 from solver.results.measures import Measured
 from solver.scene.parameter_paths import parameter_unit
 from solver.views.plots import style
-from solver.views.plots.curves import FloatArray, Response
+from solver.views.plots.curves import Response
 from solver.views.plots.style import Into
 
 _DOTTED = (0, (1.2, 1.8))
@@ -107,8 +108,8 @@ def family_figure(family: Family) -> Figure:
 def peak_figure(
     scene: str,
     variable: str,
-    values: FloatArray,
-    peaks: FloatArray,
+    values: Real,
+    peaks: Real,
     *,
     optimum: tuple[float, float],
     measured: Measured,
