@@ -120,7 +120,7 @@ def test_files_that_do_not_fit_are_told_beside_them(profile: Profile, site: Site
     page.set_input_files("#matrix-input", [file("mass.mas", coordinate(M * 1e-9))])
     expect(page.get_by_label("What looks wrong")).to_contain_text("units that go together")
     page.get_by_label("mass.mas (").select_option("C")
-    expect(page.locator("#matrix-status")).to_contain_text("`M`, the mass matrix, is missing")
+    expect(page.locator("#matrix-status")).to_contain_text("`M` (the mass matrix) is missing")
 
 
 @pytest.mark.long

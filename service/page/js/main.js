@@ -3,7 +3,7 @@
 import { asOneStep, lastWritten, on, read, state, tell, write } from "./base/state.js";
 import { button, byId, dropsOn, el, onFiles, options, show } from "./base/dom.js";
 import { saveToml } from "./base/exports.js";
-import { startNotices } from "./base/notices.js";
+import { restoreTab, startFrame, startNotices, startTabs, startTheme, tabOf } from "./workbench/frame.js";
 import { edit, editCurrent, newScene } from "./editor/editor.js";
 import { Problem, patiently, post, watchStart } from "./network/api.js";
 import { forget, resume, run } from "./network/jobs.js";
@@ -22,7 +22,6 @@ import { startRenewal, startStudy } from "./views/study.js";
 import { response } from "./views/response.js";
 import { placeCards, startViews } from "./views/view.js";
 import { startComparison } from "./workbench/comparison.js";
-import { restoreTab, startFrame, startTabs, startTheme, tabOf } from "./workbench/frame.js";
 import { listProjects, startProjects } from "./workbench/projects.js";
 import { listRuns, startRunList } from "./workbench/run_list.js";
 import { startRuns } from "./workbench/runs.js";

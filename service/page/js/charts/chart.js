@@ -15,7 +15,7 @@ const DASHES = { dashed: "7 4", dotted: "2 4" };
 // bands: [[low, high]], limits: [{y, name}], marks: [{x, y, text, shape, colour}]}.
 // `unit` is the {name, perMetre} of an axis of lengths: files have them in metres, as those of the service do.
 // Charts of a tab with the same abscissa share the crosshair and the stretch that is zoomed.
-export function chart(host, { label, file, height = 300, onPick, legend = true, pickSeries = 0 }) {
+export function chart(host, { label, file, height = 300, onPick, legend = true }) {
   const read = el("p", { class: "chart-read", "aria-live": "polite" });
   const drawing = svg("svg", { class: "chart", role: "group", tabindex: 0, "aria-label": label, "aria-roledescription": `chart, arrows move along it${onPick ? ", Enter picks" : ""}` });
   const tools = el("div", { class: "chart-tools" });
@@ -28,7 +28,7 @@ export function chart(host, { label, file, height = 300, onPick, legend = true, 
 
   self.repaint = () => self.shown && paint(self, host, tall(), legend, label);
   self.draw = (what) => {
-    const before = self.shown && self.at !== null ? pointOf(self, pickSeries).x : null;
+    const before = self.shown && self.at !== null ? pointOf(self).x : null;
     self.shown = what;
     tools.hidden = false;
     drawing.toggleAttribute("hidden", false);
@@ -36,7 +36,7 @@ export function chart(host, { label, file, height = 300, onPick, legend = true, 
     if (before === null) read.textContent = "";
     self.repaint();
     // What the cursor reads is of the curve that is seen, not of the one before.
-    if (before !== null) self.cursor(nearest(self.shown.series[pickSeries], before));
+    if (before !== null) self.cursor(nearest(lineOf(self), before));
   };
   // Nothing to show is one line.
   self.clear = (words = NOTHING) => {
@@ -47,20 +47,20 @@ export function chart(host, { label, file, height = 300, onPick, legend = true, 
     read.textContent = words;
   };
   self.clear();
-  self.cursor = (index) => moveCursor(self, index, read, pickSeries);
-  drawing.addEventListener("pointermove", (event) => hover(self, event, pickSeries));
+  self.cursor = (index) => moveCursor(self, index, read);
+  drawing.addEventListener("pointermove", (event) => hover(self, event));
   drawing.addEventListener("pointerleave", () => {
     self.mark?.replaceChildren();
     self.share(null);
   });
-  joined(self, (x) => follow(self, x, read, pickSeries));
+  joined(self, (x) => follow(self, x, read));
   const justDragged = dragged(self);
-  drawing.addEventListener("keydown", (event) => keyed(self, event, onPick, pickSeries));
+  drawing.addEventListener("keydown", (event) => keyed(self, event, onPick));
   if (onPick) {
     drawing.addEventListener("click", (event) => {
       if (justDragged()) return;
-      hover(self, event, pickSeries);
-      if (self.at !== null) onPick(pointOf(self, pickSeries), self.at);
+      hover(self, event);
+      if (self.at !== null) onPick(pointOf(self), self.at);
     });
   }
   new ResizeObserver(() => {
@@ -70,10 +70,10 @@ export function chart(host, { label, file, height = 300, onPick, legend = true, 
   return self;
 }
 
-const pointOf = (self, which, at = self.at) => {
-  const line = self.shown.series[which];
-  return { x: line.x[at], y: line.y[at], series: line };
-};
+// The line that is read and picked from is the first.
+const lineOf = ({ shown }) => shown?.series[0];
+
+const pointOf = (self, at = self.at) => ({ x: lineOf(self).x[at], y: lineOf(self).y[at] });
 
 const wordsOf = ({ shown }, { x, y }, at) => shown.describe?.(x, y, at) ?? `${shown.x.name}: ${number(x, 6)} · ${shown.y.name}: ${number(y, 5)}`;
 
@@ -223,8 +223,8 @@ function key({ entries }) {
   });
 }
 
-function hover(self, event, which) {
-  const line = self.shown?.series[which];
+function hover(self, event) {
+  const line = lineOf(self);
   if (!line?.x.length) return;
   const [px, py] = placeIn(self.drawing, event);
   let [best, least] = [0, Infinity];
@@ -236,16 +236,15 @@ function hover(self, event, which) {
   self.cursor(best);
 }
 
-function moveCursor(self, index, read, which) {
-  const line = self.shown.series[which];
+function moveCursor(self, index, read) {
+  const line = lineOf(self);
   if (!line?.x.length) return;
   const way = index < (self.at ?? 0) ? -1 : 1;
   let next = Math.min(Math.max(index, 0), line.x.length - 1);
   while (line.y[next] === null && line.y[next + way] !== undefined) next += way;
   if (line.y[next] === null || line.x[next] === null) return;
   self.at = next;
-  const point = pointOf(self, which);
-  const { x, y } = point;
+  const { x, y } = pointOf(self);
   const [px, py] = [self.xs.at(x), self.ys.at(y)];
   show(
     self.mark,
@@ -254,30 +253,30 @@ function moveCursor(self, index, read, which) {
   );
   self.share(x);
   read.setAttribute("aria-live", "polite");
-  read.textContent = wordsOf(self, point, self.at);
+  read.textContent = wordsOf(self, { x, y }, self.at);
 }
 
 // The cursor of another chart: where it stands in this one, and the value there, which is not spoken.
-function follow(self, x, read, which) {
-  const line = self.shown.series[which];
+function follow(self, x, read) {
+  const line = lineOf(self);
   const at = x === null || !line?.x.length ? null : nearest(line, x);
-  const point = at === null ? { y: null } : pointOf(self, which, at);
+  const point = at === null ? { y: null } : pointOf(self, at);
   const onIt = point.y === null ? [] : [shape("circle", self.xs.at(point.x), self.ys.at(point.y), 4, 7)];
   if (!rule(self, x, ...onIt) || point.y === null) return;
   read.setAttribute("aria-live", "off");
   read.textContent = wordsOf(self, point, at);
 }
 
-function keyed(self, event, onPick, which) {
-  const count = self.shown?.series[which]?.x.length ?? 0;
+function keyed(self, event, onPick) {
+  const count = lineOf(self)?.x.length ?? 0;
   if (!count) return;
-  if (zoomKey(self, event, () => (self.at === null ? null : pointOf(self, which).x))) return;
+  if (zoomKey(self, event, () => (self.at === null ? null : pointOf(self).x))) return;
   const at = self.at ?? 0;
   const moves = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 };
   if (event.key in moves) self.cursor(at + moves[event.key]);
   else if (event.key === "Home") self.cursor(0);
   else if (event.key === "End") self.cursor(count - 1);
-  else if ((event.key === "Enter" || event.key === " ") && onPick) onPick(pointOf(self, which), at);
+  else if ((event.key === "Enter" || event.key === " ") && onPick) onPick(pointOf(self), at);
   else return;
   event.preventDefault();
 }

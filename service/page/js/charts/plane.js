@@ -74,13 +74,11 @@ const SHAPES = {
   square: (x, y, r) => svg("rect", { x: x - r, y: y - r, width: 2 * r, height: 2 * r }),
   diamond: (x, y, r) => svg("path", { d: `M${x} ${y - 1.4 * r}L${x + 1.4 * r} ${y}L${x} ${y + 1.4 * r}L${x - 1.4 * r} ${y}Z` }),
   triangle: (x, y, r) => svg("path", { d: `M${x} ${y - 1.3 * r}L${x + 1.2 * r} ${y + r}L${x - 1.2 * r} ${y + r}Z` }),
-  cross: (x, y, r) => svg("path", { d: `M${x - r} ${y - r}L${x + r} ${y + r}M${x - r} ${y + r}L${x + r} ${y - r}` }),
 };
 
 export function shape(kind, x, y, r, colour, title) {
   const node = SHAPES[kind](x, y, r);
-  node.setAttribute("class", kind === "cross" ? `c${colour}` : `f${colour}`);
-  if (kind === "cross") node.setAttribute("stroke-width", 2);
+  node.setAttribute("class", `f${colour}`);
   if (title) node.append(svg("title", {}, title));
   return node;
 }

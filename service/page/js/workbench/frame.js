@@ -1,9 +1,11 @@
 // The frame of the page: the drawer that holds the rail where there is no room for it, the menus of the bar, the chips of
-// values that differ from the scene, light or dark; the tabs: which cards are seen together.
+// values that differ from the scene, light or dark; the tabs: which cards are seen together; the banner: the service away,
+// a refusal, a key wanted.
 
-import { button, byId, el, show } from "../base/dom.js";
+import { button, byId, el, onSubmit, say, show } from "../base/dom.js";
 import { quantity } from "../base/format.js";
 import { FIRST_TAB, on, state, step, tell, write } from "../base/state.js";
+import { setKey } from "../network/api.js";
 import { ownValue, variable } from "../scene/scenes.js";
 import { TABS, viewOf } from "../views.js";
 import { putAll } from "../views/live.js";
@@ -137,4 +139,37 @@ function openTab(name) {
   for (const card of cards()) card.classList.toggle("off", !isOn(card, name));
   tell("tab-shown", name);
   if (state.scene) write();
+}
+
+const NOTICE_SECONDS = 12;
+let fading = 0;
+
+// The banner says something, or nothing; what stays does so until something else is said.
+function told(words, stays = false) {
+  clearTimeout(fading);
+  show(byId("banner"), words);
+  byId("banner").hidden = !words;
+  if (words && !stays) fading = setTimeout(silent, NOTICE_SECONDS * 1000);
+}
+
+function silent() {
+  byId("banner").hidden = true;
+}
+
+export function startNotices() {
+  on("offline", () => told("The service does not answer. Nothing is lost: this page goes on when it is back.", true));
+  on("online", silent);
+  // While the service starts the banner says what; what goes on then is not for it to hide.
+  on("starting", (text) => told(text ?? "", true));
+  on("notice", (text) => told([text, " ", button("Close", silent)]));
+  on("key-wanted", (problem) => {
+    byId("key-form").hidden = false;
+    say("key-status", problem.message);
+  });
+  onSubmit(byId("key-form"), () => {
+    setKey(byId("key").value.trim());
+    byId("key").value = "";
+    byId("key-form").hidden = true;
+    tell("key");
+  });
 }
