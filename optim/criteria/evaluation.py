@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Annotated
+from dataclasses import replace
+from typing import NamedTuple
 
 from optim.criteria.constraint_rows import CaseResponse, DesignEvaluation
 from optim.criteria.criterion import Criterion, CriterionRow, Judged, criteria
@@ -67,7 +67,6 @@ def _case(
     """Compute the responses and rows of one case."""
     here = case.scene.with_values(parameter_values(problem.variables, values))
     effects = effects_of(problem, here)
-    judge = Judge(problem=problem, case=case, gradients=gradients)
     responses: list[CaseResponse] = []
     rows: list[CriterionRow] = []
     for i, over in enumerate(ranges_of(problem, case)):
@@ -81,13 +80,14 @@ def _case(
                     errors=errors,
                 )  # fmt: skip
         else:
+            start, stop = over.hertz or (None, None)
             branch = sweep(
-                here, start=over.low, stop=over.high, harmonics=problem.harmonics, limit=problem.limit,
+                here, start=start, stop=stop, harmonics=problem.harmonics, limit=problem.limit,
                 settings=replace(SETTINGS, errors=errors), effects=effects, should_stop=should_stop,
                 course=None if there is None else _begin(problem, here, effects, there),
             )  # fmt: skip
         responses.append(CaseResponse(case=case.name, branch=branch, shared=shared))
-        rows += judge.rows(branch, over)
+        rows += rows_of(problem, case, branch, over, gradients=gradients)
     return responses, rows
 
 
@@ -104,13 +104,11 @@ def effects_of(problem: Problem, scene: Scene) -> Effects:
     return Effects(even_harmonics=even_harmonics_reason(scene, problem.paths) is not None)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Range:
-    """Frequencies [Hz] of a response that is judged."""
+class Range(NamedTuple):
+    """A response that is judged: its frequencies [Hz], None for the band, and what it is judged by."""
 
-    low: Annotated[float | None, "Its lower end; None for the band."]
-    high: Annotated[float | None, "Its upper end; None for the band."]
-    criteria: Annotated[tuple[Criterion, ...], "What it is judged by."]
+    hertz: tuple[float, float] | None
+    criteria: tuple[Criterion, ...]
 
 
 def ranges_of(problem: Problem, case: LoadCase) -> tuple[Range, ...]:
@@ -123,28 +121,24 @@ def ranges_of(problem: Problem, case: LoadCase) -> tuple[Range, ...]:
         and (one.always or problem.weights.get(one, 0.0) > 0.0 or limits.get(one) is not None)
     ]
     beyond = [
-        Range(low=low, high=high, criteria=(one,))
+        Range(hertz, (one,))
         for one in every
         if one.ranges is not None and limits.get(one) is not None
-        for low, high in one.ranges(limits.get(one), case)
+        for hertz in one.ranges(limits.get(one), case)
     ]
-    return (Range(low=None, high=None, criteria=tuple(of_band)), *beyond)
+    return (Range(None, tuple(of_band)), *beyond)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Judge:
-    """Turns the responses of one case into rows."""
+def rows_of(
+    problem: Problem, case: LoadCase, branch: Branch, over: Range, *, gradients: bool = True
+) -> list[CriterionRow]:
+    """Return the rows of a response over a range; none unless it covers it and has a peak.
 
-    problem: Annotated[Problem, "What is judged."]
-    case: LoadCase
-    gradients: Annotated[bool, "Compute them (otherwise they are NaN)."]
-
-    def rows(self, branch: Branch, over: Range) -> list[CriterionRow]:
-        """Return the rows of a response over a range; none unless it covers it and has a peak."""
-        if not branch.reached or not branch.peaks:
-            return []
-        hertz = None if over.low is None or over.high is None else (over.low, over.high)
-        judged = Judged(
-            problem=self.problem, case=self.case, branch=branch, gradients=self.gradients, hertz=hertz
-        )  # fmt: skip
-        return [row for criterion in over.criteria for row in criterion.rows(judged)]
+    Parameters
+    ----------
+    gradients : compute them (otherwise they are NaN).
+    """
+    if not branch.reached or not branch.peaks:
+        return []
+    judged = Judged(problem=problem, case=case, branch=branch, gradients=gradients, hertz=over.hertz)
+    return [row for criterion in over.criteria for row in criterion.rows(judged)]

@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from optim.criteria.constraint_rows import CaseResponse, DesignEvaluation
-from optim.criteria.evaluation import Judge, effects_of, evaluate, ranges_of
+from optim.criteria.evaluation import effects_of, evaluate, ranges_of, rows_of
 from optim.criteria.peak_criterion import PEAK
 from optim.methods.evaluator import DesignSearch, SearchStoppedError
 from optim.methods.linearised import of_one
@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from optim.results.design_result import DesignResult
 
 
+MOST_CASES = 4
+_OPTIMAL = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND)
 _STATUS = {
     TrackStatus.TRACKED: DesignStatus.OPTIMAL,
     TrackStatus.AT_BOUND: DesignStatus.OPTIMAL,
@@ -121,14 +123,9 @@ def _evaluation(problem: Problem, found: LeastPeak) -> DesignEvaluation | None:
         return None
     if problem.limit is not None:
         return evaluate(problem, {variable.name: found.at})
-    judge = Judge(problem=problem, case=case, gradients=True)
-    rows = judge.rows(found.branch, ranges_of(problem, case)[0])
+    rows = rows_of(problem, case, found.branch, ranges_of(problem, case)[0])
     response = CaseResponse(case=case.name, branch=found.branch)
     return DesignEvaluation(values={variable.name: found.at}, responses=(response,), rows=tuple(rows))
-
-
-MOST_CASES = 4
-_OPTIMAL = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND)
 
 
 def tracked_starts(

@@ -12,7 +12,7 @@ import numpy as np
 
 from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.criterion import Criterion, CriterionRow
-from optim.criteria.evaluation import Judge, effects_of, evaluate, ranges_of
+from optim.criteria.evaluation import effects_of, evaluate, ranges_of, rows_of
 from optim.methods.linearised import PENALTY, Model, model_of
 from optim.problem.cases import LoadCase
 from optim.problem.checks import Aim
@@ -218,18 +218,18 @@ def _of_all_blades(
     ranges = ranges_of(problem, case)
     rows: list[CriterionRow] = []
     for over in ranges:
+        start, stop = over.hertz or (None, None)
         branch = sweep(
-            here, start=over.low, stop=over.high, harmonics=problem.harmonics, limit=problem.limit,
+            here, start=start, stop=stop, harmonics=problem.harmonics, limit=problem.limit,
             settings=ContinuationSettings(errors=False), effects=effects, should_stop=should_stop,
         )  # fmt: skip
         if not branch.reached:
             return [], len(ranges)
         for j, dof in enumerate(blades):
             seen = branch if j == 0 else observing(branch, dof, limit=problem.limit, errors=False)
-            judge = Judge(
-                problem=problem, case=replace(case, name=f"{case.name}, {dof}"), gradients=gradients
-            )
-            rows += [row for row in judge.rows(seen, over) if j == 0 or row.quantity.each_blade]
+            named = replace(case, name=f"{case.name}, {dof}")
+            found = rows_of(problem, named, seen, over, gradients=gradients)
+            rows += [row for row in found if j == 0 or row.quantity.each_blade]
     return rows, len(ranges)
 
 
