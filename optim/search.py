@@ -188,8 +188,14 @@ def doubts(problem: Problem, seen: Seen) -> tuple[Problem, Seen]:
 
 
 STAGES: tuple[Stage, ...] = (
-    first_look, search, enough_harmonics, plateau, enough_harmonics, plateau, doubts,
-)  # fmt: skip
+    first_look,  # by which measure to search
+    search,  # the best design by the method
+    enough_harmonics,  # the best by the right measure, with the harmonics that it needs
+    plateau,  # how far others are as good, and which of them is chosen
+    enough_harmonics,  # where another one was chosen
+    plateau,  # where that one needed another measure or more harmonics
+    doubts,  # what may be claimed of it
+)
 """How a design is found: each stage takes the problem and what the ones before have seen, and adds to it."""
 
 

@@ -1,1 +1,1 @@
-"""What a design is judged by: one criterion a file, put into one registry (`criterion_registry`)."""
+"""What a design is judged by: criteria, those of one measure in one module, in one registry (`criterion`)."""
