@@ -155,13 +155,12 @@ class GlobalSearch:
             before = self._best()
             for _ in range(most):
                 # One at a time: the end of one may lie lower than another can lead.
-                begins = self._begins()
-                for begin in begins:
-                    self._starts.append(scaled(self.search.variables, begin.values))
-                for exact in self._samples.exact(begins):
-                    self._descend(exact)
-                if not begins:
+                begin = self._begin()
+                if begin is None:
                     break
+                self._starts.append(scaled(self.search.variables, begin.values))
+                for exact in self._samples.exact([begin]):
+                    self._descend(exact)
             after = self._best()
             idle = 0 if turn == 0 or _beats(after, before) else idle + 1
             enough = IDLE if self._samples.n <= 2 else IDLE_MANY
@@ -266,13 +265,13 @@ class GlobalSearch:
     def _ended(self, there: DesignEvaluation) -> Local:
         return ended(there, self.search.model(there), self.search.variables)
 
-    def _begins(self) -> list[DesignEvaluation]:
+    def _begin(self) -> DesignEvaluation | None:
         """Return the next design of the look to start from, if any.
 
         No neighbour beats it, and it may lead below the best.
         """
         if not self._samples.seen:
-            return []
+            return None
         ends = [local.evaluation for local in self.found]
         started = [*self._starts, *(scaled(self.search.variables, end.values) for end in ends)]
         wanted, enough = self._distinct() < self.search.problem.basins, WORTH * self._samples.least()
@@ -280,8 +279,8 @@ class GlobalSearch:
             z = scaled(self.search.variables, one.values)
             fresh = all(np.abs(z - other).max() >= self._samples.apart for other in started)
             if fresh and (wanted or potential <= enough):
-                return [one]
-        return []
+                return one
+        return None
 
     def _distinct(self) -> int:
         """Return how many ends differ."""

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from optim.problem.cases import LoadCase, displaced
-from optim.problem.checks import DesignError, is_number, share
+from optim.problem.checks import DesignError, is_number, positive, share
 from optim.problem.uncertainty_set import Coordinate, Disk, How, Scenario, UncertainSet, UncertaintyShape
 from optim.problem.variables import BoundedVariable, Real
 from solver.balance.balance import Kind, resolve
@@ -298,12 +298,10 @@ def _disks(scene: Scene, table: object, where: Place) -> tuple[Disk, ...]:
         lists = rows if isinstance(rows[0], Sequence) else [rows]
         disks = tuple(Disk(of=of, values=tuple(float(x) for x in row)) for row in lists)
     else:
-        spread, seeds = table.get("spread"), table.get("seeds", [1])
-        if not is_number(spread) or spread <= 0.0:
-            raise DesignError((*where, "spread"), spread, "must be a number > 0")
+        spread, seeds = positive((*where, "spread"), table.get("spread")), table.get("seeds", [1])
         if not isinstance(seeds, Sequence) or isinstance(seeds, str) or not seeds:
             raise DesignError((*where, "seeds"), seeds, "must be a list of whole numbers")
-        disks = tuple(Disk(of=of, spread=float(spread), seed=seed) for seed in seeds)
+        disks = tuple(Disk(of=of, spread=spread, seed=seed) for seed in seeds)
     for disk in disks:
         with at(*where):
             disk.on(scene)
