@@ -71,7 +71,7 @@ def _ranges(name: str, ranges: object) -> Ranges:
     return tuple(range_above_zero((name, i), list(pair)) for i, pair in enumerate(pairs))
 
 
-FORBIDDEN = Criterion(
+FORBIDDEN: Criterion = Criterion(
     name="amplitude in a forbidden range",
     unit="m",
     help="The highest amplitude of the observed DOF over each forbidden range.",
@@ -118,7 +118,7 @@ def _read_running(asked: CriterionContext) -> _Over:
     return _Over(ranges, None if bound is None else positive(_LIMIT, bound))
 
 
-RUNNING = Criterion(
+RUNNING: Criterion = Criterion(
     name="running amplitude",
     unit="m",
     help="The highest amplitude of the observed DOF at running speeds, times the order of each case its "

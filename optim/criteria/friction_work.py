@@ -77,7 +77,7 @@ def by_contact(key: str, limits: object, scene: Scene) -> Mapping[str, float]:
     return positive_of_each(key, limits, [contact.name for contact in scene.contacts], rubbing, "contacts")
 
 
-FRICTION_WORK = Criterion(
+FRICTION_WORK: Criterion = Criterion(
     name="friction work",
     unit="J",
     help="The [friction work](wear.md) of a contact in a cycle, at any frequency of the band.",
@@ -114,7 +114,7 @@ def _read_wear(asked: CriterionContext) -> Read:
     return {name: (bound, each[name]) for name, bound in bounds.items()}
 
 
-WEAR_RATE = Criterion(
+WEAR_RATE: Criterion = Criterion(
     name="wear rate",
     unit="m³/s",
     help="The volume that wears off a contact in a second, a coefficient times its friction power, at any "

@@ -101,7 +101,11 @@ def _others(scene: Scene, given: Mapping[str, Any], *, sound: bool) -> Iterator[
         elif name == "scaling" and sound:
             yield (name,), partial(check_variables, scene, variables, value)
         elif name == "start" and sound:
-            yield (name,), lambda start=value: read_start(check_variables(scene, variables), start)
+            yield (name,), partial(_start, scene, variables, value)
+
+
+def _start(scene: Scene, variables: Mapping[str, Any] | None, start: Mapping[str, Any]) -> object:
+    return read_start(check_variables(scene, variables), start)
 
 
 def _refused(pieces: Iterator[Piece] | list[Piece]) -> list[Refusal]:

@@ -20,10 +20,9 @@ from solver.results.order_statistics import quantile_json
 from solver.results.told import Piece, json_number
 
 if TYPE_CHECKING:
-    from optim.methods.linearised import Conditions
     from optim.problem.design_problem import Problem
     from optim.problem.uncertainty_set import Scenario, UncertainSet
-    from optim.results.design_result import DesignResult
+    from optim.results.design_result import Conditions, DesignResult
     from optim.robust.scenarios import Outcome
 
 QUANTILES = (0.05, 0.5, 0.95)
