@@ -28,7 +28,7 @@ def test_cases_that_observe_another_dof_share_a_response_wherever_they_stand() -
         {"name": "other order", "observe": "m1", "order": 2},
     ]
     problem = pose(case_a(), variables=LOAD, cases=cases, harmonics=3)
-    assert [case.beside for case in problem.cases] == [None, None, "as built", None, None]
+    assert [case.served_by for case in problem.cases] == [None, None, "as built", None, None]
     found = evaluate(problem, {"damper.N0": 300.0}, gradients=False)
     assert (len(found.responses), found.computed) == (5, 4)
     alone = evaluate(replace(problem, cases=problem.cases[2:3]), {"damper.N0": 300.0}, gradients=False)
