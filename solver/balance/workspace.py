@@ -164,8 +164,10 @@ class Workspace:
         found = self._plain(p, ways[:first], guess)
         if not found.converged:
             held = self._held_in_place(p, found.iterations)
-            if held.ratchets and not together and self._may_stick(p):
-                held = replace(held, ratchets=False)
+            if held.ratchets and not together:
+                # Where residual friction forces let every contact stick it does not.
+                sticks = may_stick(self.balance, self.system, self.receptance(p), self._stuck(p), p)
+                held = replace(held, ratchets=not sticks)
             found = held if held.converged or held.ratchets or first == len(ways) else found
         if found.converged or found.ratchets or first == len(ways):
             return found
@@ -251,10 +253,6 @@ class Workspace:
         u = np.zeros(self.balance.n_unknowns)
         stuck_start(self.system, self.linear, p, u)
         return u
-
-    def _may_stick(self, p: float) -> bool:
-        """Return whether residual friction forces let every contact stick."""
-        return may_stick(self.balance, self.system, self.receptance(p), self._stuck(p), p)
 
     def law_fails(self, p: float, u: Real | None = None) -> bool:
         """Return whether a contact has no force at u, without one at the stuck response."""

@@ -11,7 +11,6 @@ is the scene at one point of it.
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -431,15 +430,14 @@ class Aerodynamics(LinearTerm):
 
     def entries(self, sectors: int) -> tuple[Entry, ...]:
         """What it adds to the matrices of a disk of so many sectors."""
-        given = self.influence or _of_diameters(self.nodal_diameters, sectors)
+        given = tuple(
+            (blade.offset, complex(blade.stiffness, blade.imaginary), complex(blade.damping))
+            for blade in self.influence
+        )
         return tuple(
             Entry(self.dof, self.dof, offset, self.factor * k, self.factor * c, 0.0, 0.0)
-            for offset, k, c in (each if isinstance(each, tuple) else _of_blade(each) for each in given)
+            for offset, k, c in given or _of_diameters(self.nodal_diameters, sectors)
         )
-
-
-def _of_blade(given: Influence) -> tuple[int, complex, complex]:
-    return given.offset, complex(given.stiffness, given.imaginary), complex(given.damping)
 
 
 def _of_diameters(
@@ -454,15 +452,11 @@ def _of_diameters(
     real, imaginary = (np.where(np.abs(part) > least, part, 0.0) for part in (blades.real, blades.imag))
     blades = real + 1j * imaginary
     return tuple(
-        (_shortest(m, sectors), complex(blades[0, m]), complex(blades[1, m]))
+        # The offset the short way round.
+        (m - sectors if 2 * m > sectors else m, complex(blades[0, m]), complex(blades[1, m]))
         for m in range(sectors)
         if np.any(blades[:, m])
     )
-
-
-def _shortest(offset: int, sectors: int) -> int:
-    """The offset the short way round."""
-    return offset - sectors if offset > math.floor(sectors / 2) else offset
 
 
 Coefficients = Annotated[tuple[Signed, ...], Field(min_length=1, max_length=3)]
