@@ -193,9 +193,7 @@ class CriterionRow(Piece):
         "Computes the exact second derivatives by the variables, (n_variables, n_variables), NaN where "
         "they do not exist; None where the solver has none.",
     ] = field(default=None, compare=False, repr=False)
-    flags: Annotated[
-        tuple[str, ...], "What its value assumes or leaves open, see `solver.results.known.FLAGS`."
-    ] = ()
+    flags: Annotated[tuple[str, ...], "Names of what its value assumes or leaves open."] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return it as one JSON object, value and bound as results say them."""

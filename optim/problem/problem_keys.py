@@ -2,7 +2,7 @@
 
 The arguments of `optim.design`, `robust_design` and `pareto_front` (`keywords`), problem files,
 bodies of requests, options of the command and the table in docs/design.md follow from these models. They know
-types and ranges; whether a description fits its scene, `optim.problem.reading` finds.
+types and ranges; whether a description fits its scene, `optim.problem.design_problem` finds.
 """
 
 from __future__ import annotations

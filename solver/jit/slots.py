@@ -241,7 +241,6 @@ def _address_of(text: int, size: int) -> int:
 llvmlite.binding.add_symbol(_RESOLVER, ctypes.cast(_address_of, ctypes.c_void_p).value)
 
 
-_Function = TypeVar("_Function", bound=Callable[..., Any])
 _WORD = ir.IntType(64)
 MOST = 4096  # kernels of a contract
 

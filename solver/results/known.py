@@ -127,9 +127,7 @@ class Known(Piece):
     half_peak_to_peak_error: Annotated[FloatOrNaN, "Estimated error of half peak to peak [m], likewise."] = (
         math.nan
     )
-    flags: Annotated[
-        tuple[str, ...], "What the responses assume or leave open, see `solver.results.known.FLAGS`."
-    ] = ()
+    flags: Annotated[tuple[str, ...], "Names of what the responses assume or leave open."] = ()
     notes: Annotated[
         tuple[Note, ...],
         "What is to be known before they are gone by: a highest amplitude at an end of the band, what of the "

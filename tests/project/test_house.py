@@ -5,10 +5,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 MOST = {
-    "lines of solver and optim": 83_683, "modules of solver and optim": 465,
-    "lines of service and migrations": 32_341, "modules of service and migrations": 173,
-    "lines of the page": 10_088, "names of modules twice": 15, "longest chain of imports": 31,
-    "deepest folder": 3, "modules in circles": 0,
+    "lines of solver and optim": 80_900, "modules of solver and optim": 346,
+    "lines of service and migrations": 31_106, "modules of service and migrations": 142,
+    "lines of the page": 9_440, "names of modules twice": 12, "longest chain of imports": 26,
+    "deepest folder": 3, "modules in circles": 0, "modules of solver and optim that read mu": 23,
 }  # fmt: skip
 """After the last change that took something away. A change that needs more takes it from somewhere else."""
 
@@ -24,6 +24,7 @@ def test_the_core_does_not_grow() -> None:
         "lines of the page": found.page(), "names of modules twice": found.twice()[1],
         "longest chain of imports": found.depth(), "deepest folder": found.deepest(),
         "modules in circles": sum(map(len, found.circles("at once"))),
+        "modules of solver and optim that read mu": found.reading_mu(),
     }  # fmt: skip
     more = {what: value for what, value in measured.items() if value > MOST[what]}
     assert more == {}, f"more than {[MOST[what] for what in more]}"

@@ -400,9 +400,8 @@ def _instants(elements: tuple[PeriodElement, ...], last: float) -> list[float]:
             changes |= {edge % PERIOD for edge in piece.edges}
             if SHORTEST < piece.lasts < PERIOD - SHORTEST:
                 changes |= {piece.begin % PERIOD, piece.end % PERIOD}
-    ordered = sorted(changes)
     kept = [0.0]
-    for tau in ordered[1:]:
+    for tau in sorted(changes)[1:]:
         if tau - kept[-1] > SHORTEST and tau < last - SHORTEST:
             kept.append(tau)
     return [*kept, last]
