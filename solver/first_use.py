@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from functools import cache, wraps
 from importlib import import_module
 from types import FunctionType
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar, cast
 
 from solver.lab import LAB, is_there
 
@@ -48,6 +48,12 @@ def names_in(file: str, package: str) -> dict[str, str]:
         for name in names.partition(")")[0].strip("( \n").split(",")
         if name.strip()
     }
+
+
+def on_demand(place: str) -> Callable[..., Any]:
+    """Load a function by its place, ``module:name``."""
+    module, _, name = place.partition(":")
+    return cast("Callable[..., Any]", getattr(import_module(module), name))
 
 
 def on_first_use(

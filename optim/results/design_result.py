@@ -13,7 +13,8 @@ from optim.criteria.peak_criterion import BAND, PEAK
 from optim.problem.checks import Method
 from optim.results.doubts import doubts_of
 from solver.arrays import FloatOrNaN
-from solver.results.base import Drawn, MadeOfResponses, Views, on_demand
+from solver.first_use import on_demand
+from solver.results.base import Drawn, MadeOfResponses, Views
 from solver.results.known import Known, Note, Stable, Verdict, notes_of_all, worst
 from solver.results.measures import Measured
 from solver.results.told import Piece, json_number

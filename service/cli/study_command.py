@@ -22,8 +22,8 @@ from service.errors import InputError
 from service.jobs.study import Answer, Study, Watch, Writable
 from service.rendering.text import show
 from solver.errors import SettingError
+from solver.first_use import on_demand
 from solver.jit.compiler_process import cost, prepare
-from solver.results.base import on_demand
 from solver.results.watch import stopped_by_interrupt
 
 if TYPE_CHECKING:

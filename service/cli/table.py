@@ -20,8 +20,8 @@ from typer.core import TyperCommand, TyperGroup
 from service.cli.failures import REPORTED, report
 from service.cli.options.inputs import join_words
 from service.jobs.names import home_of
+from solver.first_use import on_demand
 from solver.lab import LAB, is_there
-from solver.results.base import on_demand
 
 STUDY = "study"
 

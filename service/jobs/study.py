@@ -42,7 +42,7 @@ from service.jobs.kind_registry import (
 )
 from service.jobs.names import home_of
 from solver.errors import Issue, SettingError
-from solver.results.base import on_demand
+from solver.first_use import on_demand
 from solver.results.watch import part_of
 
 if TYPE_CHECKING:

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import FloatOrNaN, Integer, Real
-from solver.results.base import Drawn, Views, on_demand
+from solver.first_use import on_demand
+from solver.results.base import Drawn, Views
 from solver.results.known import NOTHING_DAMPS, Known, Note, Stable, Verdict
 from solver.results.told import Piece
 from solver.scene.scene import Scene

@@ -11,7 +11,8 @@ import numpy as np
 
 from solver.arrays import FloatOrNaN, Real
 from solver.errors import SettingError
-from solver.results.base import Drawn, Views, on_demand
+from solver.first_use import on_demand
+from solver.results.base import Drawn, Views
 from solver.results.known import Note, Stable, Verdict
 from solver.scene.scene import Scene
 

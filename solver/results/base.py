@@ -6,9 +6,9 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from solver.first_use import on_demand
 from solver.lab import LAB
 from solver.results.known import Known, Note, worst_of
 from solver.results.told import Block, Summary, Told
@@ -87,13 +87,6 @@ class Views:
         named = {"told": self.told, "to_dataset": self.dataset, "figure": self.figure}[what]
         given = result.to_json() if ":" in named else result
         return on_demand(self.place(what))(given, *arguments, **options)
-
-
-def on_demand(place: str) -> Callable[..., Any]:
-    """Load a function by its place, ``module:name``."""
-    module, _, name = place.partition(":")
-    function: Callable[..., Any] = getattr(import_module(module), name)
-    return function
 
 
 class Shown(Told):

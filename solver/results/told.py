@@ -18,8 +18,6 @@ from importlib import import_module
 from types import NoneType, UnionType
 from typing import Annotated, Any, ClassVar, Self, TypeVar, Union, get_args, get_origin
 
-import numpy as np
-
 from solver.wording import fields_said, with_attributes
 
 _MOST = 30
@@ -356,9 +354,10 @@ def _value(of: Any, value: Any) -> Any:
         return math.nan if value is None else float(_of(value, int, float))
     if of in (str, bool, int, NoneType):
         return _of(value, of)
-    if origin is np.ndarray:
-        rows = _of(value, list)
-        return np.array(rows, dtype=float if _has_null(rows) else None)
+    if origin is not None and hasattr(origin, "tolist"):  # an array: what it is of has loaded NumPy
+        from numpy import array
+
+        return array(rows := _of(value, list), dtype=float if _has_null(rows) else None)
     if origin is not None and issubclass(origin, Mapping):
         return {key: _value(parts[1], one) for key, one in _of(value, dict).items()}
     if origin is tuple:

@@ -16,7 +16,8 @@ import stickslip.lab
 from service.client.client import Client
 from service.errors import ServiceProblem
 from service.jobs.kinds import studies
-from solver.results.base import Views, on_demand
+from solver.first_use import on_demand
+from solver.results.base import Views
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 HEAVY = {"numba", "llvmlite", "numpy", "scipy", "pydantic", "casadi", "httpx", "typer", "rich", "matplotlib"}

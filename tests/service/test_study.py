@@ -16,7 +16,7 @@ from service.jobs.kind_registry import JobRequest
 from service.jobs.kinds import SHIPPED, studies
 from service.jobs.kinds.bodies import KIND, body_model
 from service.jobs.study import Study
-from solver.results.base import on_demand
+from solver.first_use import on_demand
 
 STUDIES = studies()
 OF_THE_COMMAND = {"--set", "--plot", "--out", "--json", "--report", "--uncertain", "--problem"}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel, ConfigDict, Field, create_model
 from pydantic.fields import FieldInfo
 
-from solver.results.base import on_demand
+from solver.first_use import on_demand
 
 if TYPE_CHECKING:
     from solver.results.told import Told

@@ -15,7 +15,7 @@ from service.jobs.common.study_keys import of_keys
 from service.jobs.kind_registry import Flag, Json
 from service.jobs.study import Study
 from solver.errors import Issue
-from solver.results.base import on_demand
+from solver.first_use import on_demand
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
