@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,7 @@ def recipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     [code] = re.findall(r"^```python\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
     (tmp_path / "a_recipe.py").write_text(code, "utf-8")
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "a_recipe", raising=False)  # that of another test
     assert len(code.splitlines()) <= 120
     return text
 
@@ -49,6 +51,25 @@ def test_the_service_takes_it_as_it_stands(recipe: str, tmp_path: Path) -> None:
             service.submit("frequencies", {**example, "up_to_hz": -1})
     assert job.status is JobState.SUCCESSFUL, job.error
     assert answer.result == {"stuck_hz": wanted(stuck=True), "open_hz": wanted(stuck=False)}
+
+
+def test_a_number_of_its_result_is_a_filter(recipe: str, tmp_path: Path) -> None:
+    study = tmp_path / "a_recipe.py"
+    lines = recipe.partition("## Add a filter")[2].split("```")[1].splitlines()[3:]
+    changes = re.findall(r"^-(.*)\n((?:\+.*(?:\n|$))+)", "\n".join(lines), re.MULTILINE)
+    assert len(changes) == 2
+    for old, new in changes:
+        text = study.read_text("utf-8")
+        assert text.count(f"{old}\n") == 1
+        study.write_text(text.replace(old, re.sub(r"^\+", "", new, flags=re.MULTILINE).rstrip("\n")), "utf-8")
+    settings = load_settings(database=f"sqlite:///{tmp_path}/jobs.db", workers=1, kinds=KINDS)
+    lowest = natural_frequencies(solver.load_scene("two-dof"), stuck=False)[0]
+    with EmbeddedService(settings) as service:
+        job = service.wait(service.submit("frequencies", {"scene": "two-dof"}))
+        assert job.status is JobState.SUCCESSFUL, job.error
+        found = service.stored("frequencies", lowest_hz_max=1.01 * lowest, sort="lowest_hz")
+        assert [one.id for one in found] == [job.id]
+        assert list(service.stored("frequencies", lowest_hz_max=0.99 * lowest)) == []
 
 
 @pytest.mark.usefixtures("recipe")
