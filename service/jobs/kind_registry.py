@@ -320,18 +320,19 @@ class Registry:
         return name in self._kinds
 
     def parse(self, body: Mapping[str, Any]) -> tuple[JobKind, JobRequest]:
-        """The kind that a body names, and what it asks of it.
+        """The kind that a body names, and what it asks of it (InvalidRequestError with all that is wrong)."""
+        kind = self.named_in(body)
+        return kind, request_in(body, kind.request)
 
-        InvalidRequestError with everything that is wrong.
-        """
+    def named_in(self, body: Mapping[str, Any]) -> JobKind:
+        """The kind that a body names (InvalidRequestError if it names none of these)."""
         if KIND not in body:
             raise InvalidRequestError.of((KIND,), "is missing")
         name = body[KIND]
         if not isinstance(name, str) or name not in self._kinds:
             known = ", ".join(self._kinds)
             raise InvalidRequestError.of((KIND,), f"must be one of {known}", Shown(f"{name!r:.80}"))
-        kind = self._kinds[name]
-        return kind, request_in(body, kind.request)
+        return self._kinds[name]
 
     def tell_of(self, name: str) -> Tell | None:
         """What puts results of a kind in words, if there is such a kind and it says it."""

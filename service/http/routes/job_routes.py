@@ -178,6 +178,7 @@ def submissions(registry: Registry) -> APIRouter:
 
 async def _submit(context: Context, asked: SubmissionHeaders, body: dict[str, Any]) -> Response:
     service, caller = context.service, context.caller
+    service.registry.named_in(body)  # a service may have no designs
     found = await prepared(context, body)
     row, _ = await service.lanes.writes.run(caller.owner, service.submit, body, asked.key, caller, found)
     headers = {"Location": f"/v1/jobs/{row.id}"}

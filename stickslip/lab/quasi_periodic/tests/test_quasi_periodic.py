@@ -176,8 +176,8 @@ def test_two_engine_orders_of_a_disk_are_those_of_the_whole_annulus() -> None:
     )  # fmt: skip
     assert found.turns == ((3, 5),)
     whole = annulus(scene).to_dict()
-    for force in whole["excitation"]:
-        force["harmonic"] = 3
+    for row in whole["excitation"]:
+        row["harmonic"] = 3
     for contact in whole["contacts"]:
         if ratio := contact.pop("N1_ratio", None):
             wave = {"order": 3, "amplitude": ratio * contact["N0"], "phase": contact.pop("N1_phase", 0.0)}
