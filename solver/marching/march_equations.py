@@ -109,10 +109,7 @@ Equations = tuple[Real, Real, Real, dict[str, int]]
 def _of_structure(structure: MatricesStructure, used: Sequence[str], spin: float) -> Equations:
     """The equations with the DOFs `used` as coordinates, at a speed of rotation `spin` [rad/s].
 
-    Raises
-    ------
-    SettingError
-        The structure is given by too few modes to tell the motions of these DOFs apart.
+    SettingError if the structure is given by too few modes to tell the motions of these DOFs apart.
     """
     rows = dict(zip(structure.dofs, structure.dofs.rows, strict=True))
     if structure.modes is not None:
@@ -257,10 +254,7 @@ def _with_couplings(
 ) -> tuple[csr_array, csr_array, csr_array, dict[str, int]]:
     """The same with the couplings: each is a force on one DOF by the motion of another.
 
-    Raises
-    ------
-    SettingError
-        A term of the frequency domain: structural damping, an imaginary coefficient.
+    SettingError for a term of the frequency domain: structural damping, an imaginary coefficient.
     """
     if scene.structure.loss_factor:
         raise SettingError("loss_factor", scene.structure.loss_factor, _IN_TIME)
@@ -300,12 +294,8 @@ def _with_points(
     """The same with rows of the points without inertia, for which C x' + K x = 0.
 
     With x' + R x = 0, R = C_z⁻¹ K, S = C_z⁻¹ C, the second-order rows are (d/dt + r) (S x' + R x) = 0: what
-    does not fulfil the equation at the start dies out by its own rate r, the diagonal of R.
-
-    Raises
-    ------
-    SettingError
-        A contact or a force on a point.
+    does not fulfil the equation at the start dies out by its own rate r, the diagonal of R. SettingError for
+    a contact or a force on a point.
     """
     n, points = A.shape[0] - len(K), scene.points
     ends = [

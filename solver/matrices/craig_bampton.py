@@ -18,8 +18,8 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
-from scipy.sparse import coo_array, csc_array
-from scipy.sparse.linalg import ArpackError, LinearOperator, cg, eigsh, splu
+from scipy.sparse import coo_array, csc_array, diags_array
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
 from solver.arrays import Real
 from solver.errors import FieldError
@@ -39,6 +39,8 @@ _RIGID = 0.1  # modes below this share of the shift are rigid-body modes: they a
 _FAR = 1e8  # a static solution larger than this, for a unit displacement, means that nothing holds the rest
 _FIRST = 16  # modes looked for first when only their highest frequency is given
 _BODY = 6
+_NEIGHBOURS = 5  # of the rows that the mass couples to a DOF in use, within which its inverse is solved for
+_LITTLE = 1e-10  # of the mass of a row, so that its inverse exists
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -267,15 +269,24 @@ def _errors(held: Interior, values: Real, modes: Array, lambdas: Real, shapes: A
 
 
 def _effective_mass(held: Interior, modes: Array) -> Real:
-    pushed = held.M @ held.follow + held.couplings["M"]
-    carried = np.abs(modes.conj().T @ pushed) ** 2
-    diagonal = held.M.diagonal().real
-    scale = np.where(diagonal > 0.0, diagonal, 1.0)
-    scaled = LinearOperator(held.M.shape, matvec=lambda x: x.ravel() / scale, dtype=held.M.dtype)
-    totals = np.empty(pushed.shape[1])
-    for column, force in enumerate(pushed.T):
-        moved, _ = cg(held.M, force, M=scaled, rtol=1e-8, maxiter=2000)
-        totals[column] = float(np.vdot(force, moved).real)
+    """Shares of fᴴ M⁻¹ f, f = M ψ + m, which is ψᴴ M ψ + 2 Re ψᴴ m + mᴴ M⁻¹ m, of which the last is local.
+
+    m has few rows, and the inverse of a mass fades fast away from them: it is solved for on those and some
+    neighbours. Rows that an element has for itself may move without any mass: each is given very little.
+    """
+    follow, coupled = held.follow, held.couplings["M"]
+    moved = held.M @ follow
+    carried = np.abs(modes.conj().T @ (moved + coupled)) ** 2
+    totals = np.einsum("ij,ij->j", follow.conj(), moved + 2.0 * coupled).real
+    near, joined = np.any(coupled, axis=1), (held.M != 0).astype(np.float64)
+    for _ in range(_NEIGHBOURS):
+        near |= joined @ near > 0.0
+    rows = np.flatnonzero(near)
+    if rows.size:
+        local, force = held.M[rows][:, rows], coupled[rows]
+        size = np.abs(local.diagonal())
+        solve = factor(csc_array(local + diags_array(_LITTLE * np.where(size > 0.0, size, size.max()))))
+        totals += np.einsum("ij,ij->j", force.conj(), solve(force)).real
     return np.asarray(carried / np.where(totals > 0.0, totals, 1.0))
 
 

@@ -364,10 +364,7 @@ def _placed_term(term: LinearTerm, j: int, n: int) -> LinearTerm:
 def _gas(scene: Scene, n: int) -> tuple[Coupling, ...]:
     """The aerodynamic influence between blades as couplings.
 
-    Raises
-    ------
-    SettingError
-        Damping of nodal diameters n and -n differs: no real dashpots between blades do that.
+    SettingError where damping of nodal diameters n and -n differs: no real dashpots between blades do that.
     """
     found = []
     for gas in scene.aerodynamics:

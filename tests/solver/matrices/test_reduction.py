@@ -9,6 +9,9 @@ import pytest
 from fe_files import abaqus_input, ansys_mapping, coordinate, dmig, hbmat, op4_text
 from matrix_cases import beam
 from scipy import linalg, sparse
+from skfem import Basis, BilinearForm, ElementHex1, ElementVector, MeshHex
+from skfem.helpers import dot
+from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 import solver
 from service.cli import main
@@ -54,6 +57,33 @@ def test_the_error_of_each_frequency_is_estimated_from_above_and_closely(dofs: d
     assert quality.good_to_hz > 0.3 * found.highest_hz
     assert quality.static_residual < 1e-8
     assert np.all((quality.mass_carried > 0.85) & (quality.mass_carried <= 1.0 + 1e-9))
+
+
+def test_all_modes_carry_all_of_the_mass() -> None:
+    """What is carried in the end is the whole: of bricks, whose mass joins neighbours, with rows of their own."""
+    mesh = MeshHex.init_tensor(np.linspace(0.0, 1.0, 24), np.linspace(0.0, 0.1, 3), np.linspace(0.0, 0.1, 3))
+    basis = Basis(mesh, ElementVector(ElementHex1()), intorder=3)
+    K = linear_elasticity(*lame_parameters(2.1e11, 0.3)).assemble(basis)
+    M = BilinearForm(lambda u, v, _: 7850.0 * dot(u, v)).assemble(basis)
+    held = np.flatnonzero(basis.doflocs[0] < 1e-9)
+    free = np.setdiff1d(np.arange(M.shape[0]), held)
+    K, M = (sparse.csr_array(A)[free][:, free] for A in (K, M))
+    tip = np.flatnonzero(basis.doflocs[0, free] > 1.0 - 1e-9)
+    dofs = {f"d{row}": int(row) for row in tip}
+    for inner in (0, 40):
+        # Rows of elements' own, with stiffness and a mass that some of their motions do without.
+        rng = np.random.default_rng(inner)
+        at = [tip[0] if i == 0 else i for i in range(inner)]
+        joins = sparse.csr_array((rng.uniform(0.1, 1.0, inner), (range(inner), at)), (inner, free.size))
+        mass = 1e-3 * M.diagonal().max()
+        whole = sparse.block_array(
+            [[M + mass * joins.T @ joins, mass * joins.T], [mass * joins, mass * sparse.eye_array(inner)]]
+        )
+        stiff = sparse.block_diag([K, K.diagonal().max() * sparse.eye_array(inner)])
+        everything = reduced(whole, stiff, dofs, free.size + inner - len(dofs)).quality.mass_carried
+        some = reduced(whole, stiff, dofs, 30).quality.mass_carried
+        assert everything == pytest.approx(1.0, abs=1e-6)
+        assert np.all((some > 0.1) & (some < 1.0))
 
 
 def test_static_stiffness_is_exact() -> None:
