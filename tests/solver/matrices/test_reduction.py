@@ -60,7 +60,7 @@ def test_the_error_of_each_frequency_is_estimated_from_above_and_closely(dofs: d
 
 
 def test_all_modes_carry_all_of_the_mass() -> None:
-    """What is carried in the end is the whole: of bricks, whose mass joins neighbours, with rows of their own."""
+    """All of it in the end: of bricks, whose mass joins neighbours, with rows of their own."""
     mesh = MeshHex.init_tensor(np.linspace(0.0, 1.0, 24), np.linspace(0.0, 0.1, 3), np.linspace(0.0, 0.1, 3))
     basis = Basis(mesh, ElementVector(ElementHex1()), intorder=3)
     K = linear_elasticity(*lame_parameters(2.1e11, 0.3)).assemble(basis)
