@@ -15,6 +15,7 @@ from importlib import import_module
 from typing import Any, Generic, TypeVar
 
 from solver.errors import SettingError
+from solver.first_use import on_demand
 from solver.lab import is_there
 
 VARIABLE = "STICKSLIP_EXTENSIONS"
@@ -68,9 +69,8 @@ def _read(text: str) -> tuple[object, ...]:
 
 
 def _imported(name: str) -> object:
-    module, _, attribute = name.partition(":")
     try:
-        return getattr(import_module(module), attribute)
+        return on_demand(name)
     except (ImportError, AttributeError) as error:
         raise ExtensionError(name, f" that can be imported ({error})") from error
 

@@ -6,7 +6,6 @@ looked for: a package that happens to be installed adds no kind by itself.
 
 from __future__ import annotations
 
-import importlib
 import os
 import re
 from collections.abc import Iterable
@@ -15,6 +14,7 @@ from service.errors import ConfigurationError
 from service.jobs.kind_registry import JobKind, Registry
 from service.jobs.kinds import SHIPPED
 from service.jobs.study import Study
+from solver.first_use import on_demand
 
 _ENTRY = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")
 
@@ -50,9 +50,8 @@ def _kinds_of(entry: str) -> list[JobKind]:
             f"`kinds` (STICKSLIP_KINDS) must list module:NAME, for example mypackage.kinds:FATIGUE, "
             f"got {entry!r}"
         )
-    module, _, name = entry.partition(":")
     try:
-        value = getattr(importlib.import_module(module), name)
+        value = on_demand(entry)
     except Exception as error:
         raise ConfigurationError(
             f"`kinds` (STICKSLIP_KINDS): {entry!r} cannot be imported: {type(error).__name__}: {error}"

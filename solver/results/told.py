@@ -354,10 +354,9 @@ def _value(of: Any, value: Any) -> Any:
         return math.nan if value is None else float(_of(value, int, float))
     if of in (str, bool, int, NoneType):
         return _of(value, of)
-    if origin is not None and hasattr(origin, "tolist"):  # an array: what it is of has loaded NumPy
-        from numpy import array
-
-        return array(rows := _of(value, list), dtype=float if _has_null(rows) else None)
+    if origin is not None and hasattr(origin, "tolist"):  # an array, whose type has loaded NumPy
+        rows = _of(value, list)
+        return sys.modules["numpy"].array(rows, dtype=float if _has_null(rows) else None)
     if origin is not None and issubclass(origin, Mapping):
         return {key: _value(parts[1], one) for key, one in _of(value, dict).items()}
     if origin is tuple:
