@@ -1,6 +1,6 @@
 """The keys of a design problem as keyword arguments, for type checkers: ``**problem: Unpack[…]``.
 
-Written by ``python -m service.rendering.docs_tables`` from `problem_keys`; not to be edited. A key of a
+Written by ``python docs/docs_tables.py`` from `problem_keys`; not to be edited. A key of a
 criterion from outside the package is none of these: pass it in a ``**dict[str, Any]``.
 """
 

@@ -15,12 +15,15 @@ TESTS = Path(__file__).resolve().parents[1]
 NAMED = ["sliders:SlidersContact", "rms_amplitude:RMS", "banded_text:BANDED"]
 
 
+FOLDERS = ("..", "cases", "extensions", "../docs")
+
+
 def environment() -> dict[str, str]:
     """Names all that this folder adds."""
     return {
         **os.environ, "STICKSLIP_KINDS": json.dumps(["test_a_kind:DISTORTION"]),
         extensions.VARIABLE: json.dumps(NAMED),
-        "PYTHONPATH": os.pathsep.join(str(TESTS / folder) for folder in ("..", "cases", "extensions")),
+        "PYTHONPATH": os.pathsep.join(str(TESTS / folder) for folder in FOLDERS),
     }  # fmt: skip
 
 

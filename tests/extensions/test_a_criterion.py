@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from docs_tables import TABLES, criteria_table
 from rms_amplitude import RMS, WEIGHTS, frequencies
 
 import optim
@@ -20,7 +21,6 @@ from optim.criteria.evaluation import evaluate
 from optim.problem.design_problem import pose
 from service.client.client import Client
 from service.errors import ServiceProblem
-from service.rendering.docs_tables import TABLES, criteria_table
 from solver import extensions
 from solver.errors import SettingError
 

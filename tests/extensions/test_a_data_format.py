@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from docs_tables import TABLES
 
 from optim.identification.data.measured_table import Table
 from optim.identification.readers.data_readers import DataFormat, Head, table_of
 from optim.identification.reading import read_data
 from optim.problem.checks import DataError
-from service.rendering.docs_tables import TABLES
 from solver import extensions
 from solver.scene.scene import load_scene
 

@@ -16,6 +16,7 @@ from typing import Annotated, Any
 import httpx
 import numpy as np
 import pytest
+from docs_tables import tables_of_kinds, with_tables
 from jsonschema import Draft202012Validator
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -35,7 +36,6 @@ from service.jobs.kinds import SHIPPED
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.stored_figures import SweepRecord
 from service.queue.core import Service
-from service.rendering.docs_tables import tables_of_kinds, with_tables
 from service.settings.kinds import registry_of
 from service.settings.settings import load_settings
 from solver.scene.scene import Scene

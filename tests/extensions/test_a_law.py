@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from contact_cases import central_difference
+from docs_tables import TABLES
 from joined_scene import JOINED as SCENE
 from law_cases import Element, evaluate, jacobian
 from sliders import LIMIT, SLIDERS, K, SlidersContact
@@ -19,7 +20,6 @@ import optim
 import solver
 from service.client.client import Client
 from service.errors import ServiceProblem
-from service.rendering.docs_tables import TABLES
 from solver.contacts.kernels import columns
 from solver.contacts.laws.law_registry import laws, register, unregister
 from solver.scene.json_schema import scene_schema

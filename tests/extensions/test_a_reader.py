@@ -9,11 +9,11 @@ import httpx
 import numpy as np
 import pytest
 from banded_text import BANDED
+from docs_tables import formats_table
 
 import solver
 from service.cli import main
 from service.client.client import Client
-from service.rendering.docs_tables import formats_table
 from solver import extensions
 from solver.matrices.matrix_files import MatrixFileError, read_matrix
 from solver.matrices.readers import reader_registry as registry

@@ -8,13 +8,13 @@ import sys
 from pathlib import Path
 
 import pytest
+from docs_tables import kinds_table
 
 import solver
 from service.cli import main
 from service.client.embedded import EmbeddedService
 from service.db.models import JobState
 from service.errors import InvalidRequestError
-from service.rendering.docs_tables import kinds_table
 from service.settings.kinds import registry_of
 from service.settings.settings import load_settings
 from solver.linear.natural_frequencies import natural_frequencies

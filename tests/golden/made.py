@@ -8,8 +8,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from docs_tables import SOURCES, TABLES
+
 from service.jobs.strict_json import digest
-from service.rendering.docs_tables import SOURCES, TABLES
 from tests.golden.faces import DATA, Studies, asked, helped, paths, sections
 from tests.golden.golden_cases import cases
 from tests.golden.refused import application, bodies, refusals

@@ -5,10 +5,10 @@ import shlex
 from pathlib import Path
 
 import pytest
+from docs_tables import TABLES, with_tables
 
 from optim.problem.uncertainty_input import read_uncertain
 from service.cli import main
-from service.rendering.docs_tables import TABLES, with_tables
 from solver import load_scene
 from solver.scene.toml import load_raw
 

@@ -1,4 +1,4 @@
-"""Files that follow from the code: ``python -m service.rendering.docs_tables`` brings them up to date.
+"""Files that follow from the code: ``python docs/docs_tables.py`` brings them up to date.
 
 Each table of the docs stands between two marks, ``<!-- NAME: begin -->`` and ``<!-- NAME: end -->``; a source
 is written as a whole.
@@ -34,7 +34,7 @@ from solver.matrices.readers.reader_registry import readers
 
 _HEAD = '''"""The keys of a design problem as keyword arguments, for type checkers: ``**problem: Unpack[…]``.
 
-Written by ``python -m service.rendering.docs_tables`` from `problem_keys`; not to be edited. A key of a
+Written by ``python docs/docs_tables.py`` from `problem_keys`; not to be edited. A key of a
 criterion from outside the package is none of these: pass it in a ``**dict[str, Any]``.
 """
 
