@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from alembic import command
-from alembic.config import Config
-from alembic.runtime.migration import MigrationContext
-from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, inspect
+from sqlalchemy import Connection, inspect, text
 from sqlalchemy.exc import DBAPIError
 
 from service.db import postgresql
@@ -19,31 +15,33 @@ from service.db.engine import database_name, database_path, is_sqlite, migrating
 from service.db.lock import FileLock
 from service.errors import DamagedDatabaseError, DatabaseError, WrongRevisionError
 
+if TYPE_CHECKING:
+    from alembic.config import Config
+
 # Beside this package, in the source tree and once installed; found by place, since another
 # package of this common name may come first on the path.
 _MIGRATIONS = Path(__file__).resolve().parent.parent.parent / "migrations"
 
 
 def _config() -> Config:
+    # Loaded here, as below: a service whose database has the right revision needs no Alembic.
+    from alembic.config import Config
+
     config = Config()
     config.set_main_option("script_location", str(_MIGRATIONS).replace("%", "%%"))
     config.set_main_option("path_separator", "os")
     return config
 
 
-@cache
 def head_revision() -> str:
-    """The revision this version works with."""
-    head = ScriptDirectory.from_config(_config()).get_current_head()
-    if head is None:
-        raise DatabaseError("the package `migrations` has no revisions: the installation is damaged")
-    return head
+    """The revision this version works with: the name of its file begins with it."""
+    return max(file.name for file in (_MIGRATIONS / "versions").glob("[0-9]*.py")).partition("_")[0]
 
 
 def _current(connection: Connection) -> tuple[str | None, bool]:
     """The revision of a database, and whether it has no tables at all."""
-    revision = MigrationContext.configure(connection).get_current_revision()
-    return revision, not inspect(connection).get_table_names()
+    tables, asked = inspect(connection).get_table_names(), text("SELECT version_num FROM alembic_version")
+    return connection.scalar(asked) if "alembic_version" in tables else None, not tables
 
 
 def current_revision(url: str) -> str:
@@ -62,6 +60,8 @@ def current_revision(url: str) -> str:
 
 
 def _migrate(connection: Connection, target: str) -> None:
+    from alembic import command
+
     config = _config()
     config.attributes["connection"] = connection
     command.upgrade(config, target)
@@ -121,14 +121,14 @@ def prepare(url: str) -> None:
         if revision is None and empty:
             _migrate(connection, "head")
             return
+    if revision == head_revision():
+        return
     _refuse_foreign(url, revision, empty=empty)
     _refuse_unknown(url, revision)
-    if revision != head_revision():
-        name = database_name(url)
-        raise WrongRevisionError(
-            f"{name} is at revision {revision}, this version works with {head_revision()}: "
-            f"back it up, then run `stickslip db upgrade --database {shown(url)}`"
-        )
+    raise WrongRevisionError(
+        f"{database_name(url)} is at revision {revision}, this version works with {head_revision()}: "
+        f"back it up, then run `stickslip db upgrade --database {shown(url)}`"
+    )
 
 
 def _refuse_foreign(url: str, revision: str | None, *, empty: bool) -> None:
@@ -139,6 +139,8 @@ def _refuse_foreign(url: str, revision: str | None, *, empty: bool) -> None:
 
 
 def _refuse_unknown(url: str, revision: str | None) -> None:
+    from alembic.script import ScriptDirectory
+
     known = {script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions()}
     if revision is None or revision in known:
         return

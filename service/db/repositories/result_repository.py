@@ -25,7 +25,6 @@ from sqlalchemy import (
     select,
     tuple_,
 )
-from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import aliased
 
 from service.db.clock import new_id
@@ -49,6 +48,7 @@ from service.db.postgresql import WITH_VALUES, lock_quantities
 from service.db.repositories.run_repository import in_the_bin
 from service.errors import DatabaseError
 from service.jobs.stored_figures import RECORDS, SWEEP, KindRecord, StoredArray, StoredRecord
+from solver.first_use import on_demand
 
 Name = tuple[str, str]
 """Name and label of a quantity."""
@@ -328,8 +328,8 @@ def _quantities(connection: Connection, of: str, wanted: set[Name]) -> Mapping[N
         if connection.dialect.name != "sqlite":
             lock_quantities(connection)
         _storing.add(connection.get_transaction())
-        dialect = sqlite if connection.dialect.name == "sqlite" else postgresql
-        connection.execute(dialect.insert(Quantity).on_conflict_do_nothing(), new)
+        insert_anew = on_demand(f"sqlalchemy.dialects.{connection.dialect.name}:insert")
+        connection.execute(insert_anew(Quantity).on_conflict_do_nothing(), new)
         before = _read_quantities(connection, of, missing)
     return {one: before[one] if one in before else known[of, *one] for one in wanted}
 

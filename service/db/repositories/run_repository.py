@@ -27,8 +27,6 @@ from sqlalchemy import (
     select,
     tuple_,
 )
-from sqlalchemy.dialects import postgresql, sqlite
-from sqlalchemy.dialects.postgresql import ARRAY, array
 from sqlalchemy.orm import InstrumentedAttribute
 
 from service.db.clock import Clock, earliest_id
@@ -50,6 +48,7 @@ from service.db.repositories.owned import Binned, Made, Rows, Tokens, digest_of,
 from service.errors import ConflictError, InvalidRequestError, NotFoundError
 from service.jobs.stored_figures import SWEEP
 from solver.errors import Shown
+from solver.first_use import on_demand
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,7 +144,6 @@ _CLOCKS_DIFFER = timedelta(days=1)  # of machines that make ids and of the datab
 _FEW_TEXTS = 5000
 _FEW_TAGGED = 12_000  # of a million runs: to find a page of two such tags in order would read half of them
 _LETTERS = 3  # of the pieces that the indexes of texts know
-_LETTERS_OF_RUN = func.letters_of(Run.name, Run.notes, type_=ARRAY(Text))  # as its index says it
 # Of the tables themselves, as in `jobs`.
 _OF_JOBS = [Job.__table__.c[field.name] for field in fields(JobRow) if field.name != "request"]
 _OF_RUNS = [
@@ -265,7 +263,7 @@ class Runs(Binned[RunRow]):
 
     def _lock(self, connection: Connection, row_id: str, expected: Collection[int] | None) -> None:
         """Make a row if there is none, lock it and compare its revision."""
-        insert = sqlite.insert if connection.dialect.name == "sqlite" else postgresql.insert
+        insert = on_demand(f"sqlalchemy.dialects.{connection.dialect.name}:insert")
         names = ["job_id", "project_id", "name", "notes", "changed", "revision", "deleted"]
         now = literal(self._now(), Run.changed.type)
         made = select(Job.id, null(), literal(""), literal(""), now, literal(0), null()).where(
@@ -338,7 +336,10 @@ def _containing(text: str, *, sqlite: bool) -> Condition:
         phrase = '"{}"'.format(text.replace('"', '""'))
         held = Run.number.in_(select(RUN_TEXT.c.rowid).where(RUN_TEXT.c.run_text.match(phrase)))
     elif len(text) < _LETTERS:
-        held = _LETTERS_OF_RUN.contains(array([func.lower(text)]))
+        from sqlalchemy.dialects.postgresql import ARRAY, array
+
+        letters = func.letters_of(Run.name, Run.notes, type_=ARRAY(Text))  # as the index says it
+        held = letters.contains(array([func.lower(text)]))
     ids = select(Run.job_id).where(held) if ids is None else ids
     # Of what many runs have a page is soon found by looking at each; but LIKE of SQLite folds ASCII alone.
     return Condition(ids=ids, holds=holds if text.isascii() else held, apart=True, few=_FEW_TEXTS)
