@@ -17,7 +17,7 @@ from service.jobs.common.scene_parameters import scene_parameters
 from service.jobs.common.scene_requests import read_scene, refers_to_uploads, require, resolve_scene
 from service.jobs.common.scene_text import issues_of_scene, read_text, side_by_side
 from service.jobs.common.sizes import memory_limited, work_limited
-from service.jobs.kind_registry import KIND, JobRequest, Registry, Resolve, RunOn, SceneSource, request_in
+from service.jobs.kind_registry import KIND, JobRequest, Registry, Resolve, RunOn, SceneSource
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.strict_json import JsonText, digest, encoded
 from service.jobs.studies.plan_study import Plan
@@ -110,15 +110,14 @@ def prepared(
 class _Resolving:
     """The task that resolves requests of some kinds; sent to the processes by the names of its parts."""
 
-    kinds: Mapping[str, tuple[type[JobRequest], Resolve]]
+    kinds: Mapping[str, Resolve]
 
     @classmethod
     def of(cls, registry: Registry) -> _Resolving:
-        return cls({kind.name: (kind.request, kind.resolve) for kind in registry})
+        return cls({kind.name: kind.resolve for kind in registry})
 
     def __call__(self, words: Words, source: SceneSource) -> dict[str, Any]:
-        model, resolve = self.kinds[words["body"][KIND]]
-        return asdict(prepared(resolve, request_in(words["body"], model), source=source, **words))
+        return asdict(prepared(self.kinds[words["body"][KIND]], source=source, **words))
 
 
 def _plan(words: Words, source: SceneSource) -> dict[str, Any]:

@@ -34,7 +34,7 @@ from service.db.repositories.run_repository import Runs, RunWords, Shares
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
 from service.jobs import answering
 from service.jobs.answering import Prepared, prepared
-from service.jobs.kind_registry import ABOUT_THE_RUN, JobRequest, Registry
+from service.jobs.kind_registry import ABOUT_THE_RUN, JobRequest, Registry, request_in
 from service.jobs.outputs import OnProgress
 from service.jobs.stored_figures import DESIGN, SWEEP, DesignRecord, SweepRecord
 from service.queue.lanes import Lanes
@@ -212,13 +212,13 @@ class Service:
         body: Mapping[str, Any],
         idempotency_key: str | None = None,
         caller: Caller = KEYLESS,
-        found: Prepared | None = None,
+        checked: tuple[JobRequest, Prepared] | None = None,
     ) -> tuple[JobRow, bool]:
         """Accept a job of the caller's; whether it is new, and not made before under its idempotency key.
 
         Parameters
         ----------
-        found : what the body was resolved to, beside this process if it is a stranger's.
+        checked : what the body asks for and was resolved to, beside this process if it is a stranger's.
 
         Raises
         ------
@@ -227,7 +227,8 @@ class Service:
         IdempotencyError, QueueFullError, TooManyRequestsError
             See `JobRepository.submit`.
         """
-        kind, request = self.registry.parse(body)
+        kind = self.registry.named_in(body)
+        request, found = checked or (request_in(body, kind.request), None)
         seconds = self._seconds_limit(request, caller)
         most = highest_priority(caller, self.settings)
         if request.priority > most:

@@ -1,5 +1,6 @@
 """The kinds that come with the service, on the real solver."""
 
+import pickle
 from typing import Any
 
 import httpx
@@ -9,6 +10,10 @@ from service_helpers import is_problem
 
 import solver
 from service.jobs.common.sweep_records import contact_values
+from service.jobs.kind_registry import KIND, Registry, asked_of, request_in
+from service.jobs.kinds import SHIPPED
+from service.jobs.kinds.bodies import body_model
+from service.jobs.kinds.previews import PREVIEWS
 
 WAIT = {"Prefer": "wait=60"}
 
@@ -190,3 +195,17 @@ def test_a_design_that_misses_its_goal_fails_and_keeps_the_best(shipped: httpx.C
     assert band["by"] == pytest.approx(band["value"] - 1e-6)
     assert job["result"]["optimum"]["damper.N0"] > 0.0
     assert job["sweeps"]
+
+
+@pytest.mark.parametrize("registry", [SHIPPED, PREVIEWS])
+def test_what_a_checked_body_asks_is_what_its_kind_reads_in_it(registry: Registry) -> None:
+    found = 0
+    for kind in registry:
+        for example in kind.request.model_json_schema().get("examples", ()):
+            body = {KIND: kind.name, "name": " a run ", **example}
+            checked = asked_of(body_model(kind.name, kind.request).model_validate(body), kind.request)
+            wanted = request_in(body, kind.request)
+            assert (checked, checked.model_fields_set) == (wanted, wanted.model_fields_set)
+            assert pickle.loads(pickle.dumps(checked)) == wanted
+            found += 1
+    assert found >= len(registry) - 1

@@ -29,7 +29,7 @@ from service.http.dependencies import (
 )
 from service.http.in_lane import prepared, reading
 from service.http.made_once import LargeAnswers
-from service.jobs.kind_registry import KIND, JobRequest, Registry
+from service.jobs.kind_registry import KIND, JobRequest, Registry, asked_of
 from service.jobs.kinds.bodies import DESIGN, any_body, design_body, examples, examples_of
 from service.queue.core import Service
 from service.schemas.answers import (
@@ -160,13 +160,13 @@ AskedDependency = Annotated[SubmissionHeaders, Depends(asked)]
 def submissions(registry: Registry) -> APIRouter:
     """The routes that take jobs; their bodies are those of the kinds there are."""
 
-    async def submit(body: JobRequest, context: InContext, asked: AskedDependency) -> Response:  # noqa: ARG001
+    async def submit(body: JobRequest, context: InContext, asked: AskedDependency) -> Response:
         """Accept a job. With `Prefer: wait=N` the answer waits up to N seconds for its end."""
-        return await _submit(context, asked, await context.request.json())
+        return await _submit(context, asked, body, await context.request.json())
 
-    async def submit_design(body: JobRequest, context: InContext, asked: AskedDependency) -> Response:  # noqa: ARG001
+    async def submit_design(body: JobRequest, context: InContext, asked: AskedDependency) -> Response:
         """Accept a design: a job of the kind `design`."""
-        return await _submit(context, asked, {**await context.request.json(), KIND: DESIGN})
+        return await _submit(context, asked, body, {**await context.request.json(), KIND: DESIGN})
 
     taking = APIRouter(prefix="/v1", tags=["jobs"], route_class=TypedRoute)
     takes_body(submit, any_body(registry), examples(registry), by=KIND if len(registry) > 1 else None)
@@ -176,11 +176,15 @@ def submissions(registry: Registry) -> APIRouter:
     return taking
 
 
-async def _submit(context: Context, asked: SubmissionHeaders, body: dict[str, Any]) -> Response:
+async def _submit(
+    context: Context, asked: SubmissionHeaders, body: JobRequest, raw: dict[str, Any]
+) -> Response:
     service, caller = context.service, context.caller
-    service.registry.named_in(body)  # a service may have no designs
-    found = await prepared(context, body)
-    row, _ = await service.lanes.writes.run(caller.owner, service.submit, body, asked.key, caller, found)
+    request = asked_of(body, service.registry.named_in(raw).request)  # a service may have no designs
+    found = await prepared(context, raw, request)
+    row, _ = await service.lanes.writes.run(
+        caller.owner, service.submit, raw, asked.key, caller, (request, found)
+    )
     headers = {"Location": f"/v1/jobs/{row.id}"}
     answer = partial(_job_or_result, service, headers)
     if asked.seconds is not None:

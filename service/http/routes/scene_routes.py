@@ -18,7 +18,7 @@ from service.jobs import answering
 from service.jobs.answering import PLAN, PREVIEW, STORE
 from service.jobs.common.scene_parameters import SceneParameterList
 from service.jobs.common.scene_requests import SceneRequest
-from service.jobs.kind_registry import KIND
+from service.jobs.kind_registry import KIND, asked_of
 from service.jobs.kinds.bodies import any_body, examples
 from service.jobs.kinds.previews import PREVIEWS, PreviewRequest
 from service.jobs.studies.plan_study import EXAMPLE, Plan, plan_result
@@ -214,7 +214,7 @@ async def preview(body: PreviewRequest, context: InContext) -> Response:
     """
     service, caller = context.service, context.caller
     raw = await context.request.json()
-    found = await prepared(context, raw, PREVIEW)
+    found = await prepared(context, raw, asked_of(body, PREVIEWS[raw[KIND]].request), PREVIEW)
     asking = f"{caller.owner} {body.client}" if body.client else ""
     most = share(caller, service.settings, "previews")
     spec = json.loads(found.spec)
