@@ -10,14 +10,14 @@ import contextlib
 import gc
 import signal
 
-from service.jobs import answering, kinds
-from service.jobs.kinds import previews
+from solver.first_use import on_demand
 
 signal.signal(signal.SIGTERM, signal.SIG_IGN)
-# What goes wrong here goes wrong again in each worker, which says so.
-for warm_up in (kinds.warm_up, answering.warm_up, previews.warm_up):
+# What is loaded stays, all but a hundredth: nothing looks through it, here or in the workers, nor copies it.
+gc.disable()
+for place in ("kinds", "answering", "kinds.previews"):
+    # What goes wrong here goes wrong again in each worker, which says so.
     with contextlib.suppress(Exception):
-        warm_up()
-# What is there stays: collections in the workers do not look through it, nor copy its memory.
-gc.collect()
+        on_demand(f"service.jobs.{place}:warm_up")()
 gc.freeze()
+gc.enable()

@@ -10,6 +10,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
+THREAD_LIMITS = dict.fromkeys(
+    (
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "BLIS_NUM_THREADS",
+        "VECLIB_MAXIMUM_THREADS",
+        "NUMEXPR_NUM_THREADS",
+        "NUMBA_NUM_THREADS",
+    ),
+    "1",
+)
 _MATRICES = "solver.linear"
 """The modules whose caches hold matrices and modes."""
 

@@ -28,8 +28,7 @@ from multiprocessing.context import BaseContext
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from service.workers.process_limits import address_space, limit_process
-from service.workers.worker import THREAD_LIMITS
+from service.workers.process_limits import THREAD_LIMITS, address_space, limit_process
 from solver.jit.compiler_process import missing
 
 PRELOADED = "service.workers.preloaded"
@@ -120,6 +119,15 @@ def _pidfd(pid: int, sentinel: int) -> int | None:
     # It ended, or its fork server did: its number may be another's by now.
     os.close(opened)
     return None
+
+
+def begin() -> None:
+    """Have what processes are forked off begin to load, beside what this one loads meanwhile."""
+    with _lock, _one_thread_each():
+        if _context().get_start_method() == "forkserver":
+            from multiprocessing.forkserver import ensure_running
+
+            ensure_running()
 
 
 def start(target: Callable[..., None], args: tuple[Any, ...], name: str) -> Process:

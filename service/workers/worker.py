@@ -35,19 +35,6 @@ from service.workers.spreading import BatchAnswer, Spreading, helped
 from solver.errors import SceneError, SettingError, SolverError
 from solver.results.spread import spreading
 
-THREAD_LIMITS = dict.fromkeys(
-    (
-        "OMP_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-        "MKL_NUM_THREADS",
-        "BLIS_NUM_THREADS",
-        "VECLIB_MAXIMUM_THREADS",
-        "NUMEXPR_NUM_THREADS",
-        "NUMBA_NUM_THREADS",
-    ),
-    "1",
-)
-
 _PARENT_DIED = 70
 _TERMINATION_SECONDS = 3.0
 

@@ -16,6 +16,7 @@ from service.cli.options import parameters as options
 from service.cli.options.inputs import age, count
 from service.errors import InputError
 from service.rendering.text import print_json, print_pairs, print_table, say
+from service.workers import processes
 
 if TYPE_CHECKING:
     from service.auth.callers import KeyLimits, Scope
@@ -31,6 +32,7 @@ def serve(
     workers: options.Workers = None,
 ) -> None:
     """Serve the REST API and work off its queue."""
+    processes.begin()
     from service.http.server import serve as run
 
     run(settings_of(host=host, port=port, database=database, workers=workers))
@@ -47,6 +49,7 @@ def worker(
 
     On PostgreSQL beside any number of services; on SQLite only while no service uses the file.
     """
+    processes.begin()
     from service.http.server import work
 
     work(settings_of(database=database, workers=workers), until_empty=until_empty)

@@ -25,15 +25,9 @@ from service.jobs.checkpoints import Checkpoints, KeptPieces
 from service.jobs.outputs import JobFailure, JobOutput, Pace, Report, ResultPiece
 from service.jobs.kind_registry import RunOn, WarmUp
 from service.settings import traces
-from service.workers.process_limits import ProcessLimits
+from service.workers.process_limits import THREAD_LIMITS, ProcessLimits
 from service.workers.spreading import BatchAnswer, Spreading, helped
-from service.workers.worker import (
-    THREAD_LIMITS,
-    Throttle,
-    checked,
-    failure_of,
-    out_of_memory,
-)
+from service.workers.worker import Throttle, checked, failure_of, out_of_memory
 from solver.results.spread import spreading
 
 TOPIC = "stickslip"
