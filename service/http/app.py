@@ -48,10 +48,12 @@ class _App(FastAPI):
         await (super().__call__ if scope["type"] == "http" else self.router)(scope, receive, send)
 
 
-def create_app(settings: Settings | None = None, registry: Registry | None = None) -> FastAPI:
+def create_app(
+    settings: Settings | None = None, registry: Registry | None = None, connections: Connections | None = None
+) -> FastAPI:
     """The application of one service; its lifespan starts and stops database, queue and workers.
 
-    Parameters are those of `EmbeddedService`.
+    Parameters are those of `EmbeddedService`, and the connections of the server it is behind.
     """
     service = Service(settings or load_settings(), registry)
 
@@ -83,7 +85,7 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
             "exclude": lambda scope: by_link(scope.get("path", "")),
         },
     )
-    _guard(app, service)
+    _guard(app, service, connections or Connections.of(service.settings))
     events.install(app)
     # What a path that is a route's own may be asked by: a parameter of another route might fit it too.
     app.state.own = defaultdict(set)
@@ -107,7 +109,7 @@ _ROUTERS = (
 )  # fmt: skip
 
 
-def _guard(app: FastAPI, service: Service) -> None:
+def _guard(app: FastAPI, service: Service, connections: Connections) -> None:
     """Put before the routes what admits, counts and logs requests, and where they find it."""
     settings = service.settings
     app.state.service = service
@@ -119,9 +121,7 @@ def _guard(app: FastAPI, service: Service) -> None:
     app.state.large = LargeAnswers()
     app.state.reports = Reports(service.lanes.reports)
     app.state.authenticator = Authenticator(service.keys, service.shares, settings, service.jobs.now)
-    app.state.connections = Connections(
-        settings.connections, settings.header_seconds, settings.write_seconds, settings.unsent_bytes
-    )
+    app.state.connections = connections
     service.lanes.guard(app.state.connections.require_taken)
     concurrency = ConcurrencyLimits(settings)
     # The last one added is the outermost.

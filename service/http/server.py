@@ -1,4 +1,7 @@
-"""`stickslip serve` and `stickslip worker`: processes that run a service until told to stop."""
+"""`stickslip serve` and `stickslip worker`: processes that run a service until told to stop.
+
+The server listens before the service is loaded: what that is made of is imported where it is used.
+"""
 
 from __future__ import annotations
 
@@ -14,20 +17,23 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, cast
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, cast
 
 import uvicorn
-from fastapi import FastAPI
+from starlette.responses import Response
 
-from service.db.models import JobState
 from service.errors import ConfigurationError
-from service.http.app import create_app
 from service.http.middleware.connections import Connections
-from service.http.openapi import prepare
-from service.jobs.kind_registry import Registry
-from service.queue.core import Service
 from service.settings import logs
-from service.settings.settings import Settings
+
+if TYPE_CHECKING:
+    from fastapi import FastAPI
+    from starlette.types import Receive, Scope, Send
+
+    from service.jobs.kind_registry import Registry
+    from service.queue.core import Service
+    from service.settings.settings import Settings
 
 log = logging.getLogger("stickslip.service")
 
@@ -42,7 +48,7 @@ _FORCED = 1
 class _Server(uvicorn.Server):
     """A server that sends waiting requests home before it waits for them to end."""
 
-    def __init__(self, config: uvicorn.Config, service: Service) -> None:
+    def __init__(self, config: uvicorn.Config, service: Service | _Opening) -> None:
         super().__init__(config)
         self._service = service
 
@@ -52,6 +58,57 @@ class _Server(uvicorn.Server):
         await super().shutdown(sockets)
 
 
+class _Opening:
+    """An application that is being loaded: it lives, and what else it is asked waits.
+
+    Parameters
+    ----------
+    settings : of the service.
+    load : gives the application behind these connections; in a thread.
+    ended : called if that, or its beginning or end, went wrong; `trouble` says how then.
+    """
+
+    def __init__(
+        self, settings: Settings, load: Callable[[Connections], FastAPI], ended: Callable[[], object]
+    ) -> None:
+        self.state = SimpleNamespace(connections=Connections.of(settings))
+        self.trouble: Exception | None = None
+        self._load, self._ended, self._end = load, ended, asyncio.Event()
+        self._app: asyncio.Future[FastAPI]
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request; begin and end with the server."""
+        if scope["type"] == "lifespan":
+            self._app = asyncio.get_running_loop().create_future()
+            opened = asyncio.create_task(self._open())
+            for event in ("startup", "shutdown"):
+                await receive()
+                if event == "shutdown":
+                    self._end.set()
+                    await opened
+                await send({"type": f"lifespan.{event}.complete"})
+        elif not self._app.done() and scope["path"] == "/health/live":
+            await Response(b'{"status":"live"}', media_type="application/json")(scope, receive, send)
+        else:
+            await (await asyncio.shield(self._app))(scope, receive, send)
+
+    async def _open(self) -> None:
+        try:
+            app = await asyncio.to_thread(self._load, self.state.connections)
+            async with app.router.lifespan_context(app):
+                self._app.set_result(app)
+                await self._end.wait()
+        except Exception as error:  # noqa: BLE001 - raised by whoever runs the server
+            self.trouble = error
+            self._app.cancel()
+            self._ended()
+
+    def stop_waiting(self) -> None:
+        """End every request that waits for a job."""
+        if self._app.done() and not self._app.cancelled():
+            self._app.result().state.service.stop_waiting()
+
+
 def serve(settings: Settings, registry: Registry | None = None) -> None:
     """Serve HTTP until SIGINT or SIGTERM; jobs that run then go back to the queue.
 
@@ -59,27 +116,35 @@ def serve(settings: Settings, registry: Registry | None = None) -> None:
     `Service.start`).
     """
     logs.configure(settings.log_level, settings.log_format)
-    app = create_app(settings, registry)
-    service: Service = app.state.service
     listener = _bind(settings)
-    try:
-        service.open()
+
+    def load(connections: Connections) -> FastAPI:
+        from service.http.app import create_app
+
+        app = create_app(settings, registry, connections)
+        app.state.service.open()
         log.info("listening on http://%s:%d", settings.host, listener.getsockname()[1])
-        server = _Server(_config(app, settings), service)
         spare_modules()
         give_back_memory()
+        threading.Thread(target=_begin_the_rest, args=(app,), daemon=True).start()
+        return app
 
-        def stop() -> None:
-            server.should_exit = True
-            _end_by_force_after(settings.exit_seconds)
+    def end() -> None:
+        server.should_exit = True
 
-        later = threading.Thread(target=_begin_the_rest, args=(app,), daemon=True)
+    def stop() -> None:
+        end()
+        _end_by_force_after(settings.exit_seconds)
+
+    opening = _Opening(settings, load, end)
+    server = _Server(_config(opening, settings), opening)
+    try:
         with _signals(stop):
-            later.start()
             server.run(sockets=[listener])
     finally:
-        service.database.close()
         listener.close()
+    if opening.trouble is not None:
+        raise opening.trouble
 
 
 def work(settings: Settings, registry: Registry | None = None, *, until_empty: bool = False) -> None:
@@ -90,6 +155,8 @@ def work(settings: Settings, registry: Registry | None = None, *, until_empty: b
 
     `Service.open` lists the errors. `until_empty`: end when no job waits or runs.
     """
+    from service.queue.core import Service
+
     logs.configure(settings.log_level, settings.log_format)
     stop = threading.Event()
     service = Service(settings, registry)
@@ -108,7 +175,7 @@ def work(settings: Settings, registry: Registry | None = None, *, until_empty: b
             service.stop()
 
 
-def _config(app: FastAPI, settings: Settings) -> uvicorn.Config:
+def _config(app: FastAPI | _Opening, settings: Settings) -> uvicorn.Config:
     connections: Connections = app.state.connections
     room = max(_files_allowed() - _OTHER_FILES, _LEAST_CONNECTIONS)
     if room < connections.most:
@@ -134,6 +201,8 @@ def _begin_the_rest(app: FastAPI) -> None:
     Nothing is to delay readiness; who asks for either before gets it at once. Where no kernels are compiled
     yet both begin interpreted, at once, and anew when the workers have them.
     """
+    from service.http.openapi import prepare
+
     service: Service = app.state.service
     if service.compiling:
         service.answers.begin()
@@ -195,6 +264,8 @@ def _signals(stop: Callable[[], object]) -> Iterator[None]:
 
 
 def _nothing_left(service: Service) -> bool:
+    from service.db.models import JobState
+
     counts = service.jobs.count()
     return counts[JobState.ACCEPTED] + counts[JobState.RUNNING] == 0
 
@@ -235,9 +306,9 @@ class Sparing:
 
 
 def spare_modules() -> None:
-    """Begin, with what is loaded now."""
+    """Begin, with what is loaded now, nearly all of which stays."""
     gc.callbacks.append(Sparing())
-    gc.collect()
+    gc.freeze()
 
 
 _M_MMAP_THRESHOLD, _M_ARENA_MAX = -3, -8

@@ -2,14 +2,26 @@
 
 import asyncio
 import json
+import subprocess
+import sys
+import threading
 from collections.abc import Mapping
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import httpx
 import pytest
+from fastapi import FastAPI
+from launch import COMMAND
+from private_kinds import PRIVATE
+from service_helpers import PATIENCE, MakeSettings
+from test_executor import fork_servers
 from test_previews import WaitRequest, _resolve
 
+from service.http.app import create_app
+from service.http.middleware.connections import Connections
+from service.http.server import _bind, _config, _Opening, _Server
 from service.jobs.kind_registry import JobKind, Registry
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.queue.health import readiness
@@ -73,3 +85,59 @@ def test_readiness_says_what_is_being_started(compiling: bool, ready: int) -> No
     found = readiness(service)
     assert found.ready is (compiling or ready > 0)
     assert ("compiled" in (found.starting or "")) is compiling
+
+
+def test_a_server_lives_while_its_service_is_loaded(make_settings: MakeSettings) -> None:
+    settings, go_on = make_settings(), threading.Event()
+
+    def load(connections: Connections) -> FastAPI:
+        assert go_on.wait(PATIENCE)
+        return create_app(settings, PRIVATE, connections)
+
+    opening = _Opening(settings, load, lambda: None)
+    server, listener = _Server(_config(opening, settings), opening), _bind(settings)
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+    thread.start()
+    try:
+        with httpx.Client(base_url=f"http://localhost:{listener.getsockname()[1]}") as client:
+            assert client.get("/health/live", timeout=PATIENCE).json() == {"status": "live"}
+            with pytest.raises(httpx.ReadTimeout):
+                client.get("/v1/kinds", timeout=0.3)
+            asked: list[int] = []
+            waiting = threading.Thread(
+                target=lambda: asked.append(client.get("/v1/jobs", timeout=PATIENCE).status_code)
+            )
+            waiting.start()
+            go_on.set()
+            waiting.join()
+            assert asked == [200]
+            whole = client.get("/health/live")
+            assert (whole.json(), "x-content-type-options" in whole.headers) == ({"status": "live"}, True)
+    finally:
+        go_on.set()
+        server.should_exit = True
+        thread.join()
+        listener.close()
+    assert opening.trouble is None
+
+
+def test_a_service_that_cannot_be_loaded_ends_with_the_reason(tmp_path: Path) -> None:
+    (tmp_path / "text.db").write_text("this is no database " * 100)
+    words = [*COMMAND, "serve", "--port", "0", "--database", f"sqlite:///{tmp_path}/text.db"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=PATIENCE)
+    assert done.returncode == 2
+    assert "not a database" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are forked off one on Linux only")
+def test_what_processes_are_forked_off_begins_before_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(processes, "_settings_of_the_first", None)
+    processes.begin()
+    begun = fork_servers()
+    process = processes.start(print, (), "nothing")
+    process.join(PATIENCE)
+    assert process.status() == 0
+    process.close()
+    assert [one.pid for one in begun] == [one.pid for one in fork_servers()]
+    assert len(begun) == 1

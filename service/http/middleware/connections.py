@@ -12,11 +12,14 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from service.errors import TooManyRequestsError
+
+if TYPE_CHECKING:
+    from service.settings.settings import Settings
 
 log = logging.getLogger("stickslip.http")
 
@@ -54,6 +57,13 @@ class Connections:
         # Those whose clients take less than they are sent.
         self._paused: set[Connection] = set()
         self._look_at: asyncio.TimerHandle | None = None
+
+    @classmethod
+    def of(cls, settings: Settings) -> Connections:
+        """Those of a server with such settings."""
+        return cls(
+            settings.connections, settings.header_seconds, settings.write_seconds, settings.unsent_bytes
+        )
 
     def protocol(self, **values: Any) -> Connection:
         """A protocol for a new connection, from what uvicorn gives its own."""
