@@ -29,6 +29,7 @@ from optim.problem.problem_keys import OPTIONS, ROBUST, DesignKeys, keywords
 from optim.results.design_result import SAME_PLACE, DesignResult, DesignStatus, LocalOptimum, OnBest
 from solver.continuation.branch import BranchStatus
 from solver.jit.timer import clock
+from solver.lab import from_lab
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import Scene
 
@@ -263,9 +264,8 @@ def _by_method(problem: Problem, before: DesignResult, seen: Seen) -> DesignResu
 def local_search_of(method: Method) -> LocalSearch:
     """Return the local search of a method."""
     if method is Method.IPOPT:
-        from optim.methods.ipopt import ipopt_search
-
-        return ipopt_search
+        found: LocalSearch = from_lab("ipopt.ipopt_search:ipopt_search")
+        return found
     from optim.methods.minimax import thorough_search
 
     return thorough_search

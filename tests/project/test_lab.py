@@ -15,7 +15,7 @@ PACKAGES = ("solver", "optim", "service", "migrations")
 GIVES = {
     "accuracy": ["study accuracy", "view accuracy"], "all_solutions": ["name solve_all"],
     "catalogue": ["name catalogue"], "controlled": ["study controlled"], "dask": [],
-    "exports": ["command export"], "limit_cycles": ["name limit_cycles"], "mcp": ["command mcp"],
+    "exports": ["command export"], "ipopt": [], "limit_cycles": ["name limit_cycles"], "mcp": ["command mcp"],
     "oidc": ["view oidc"], "posterior": ["study posterior", "command posterior"],
     "proofs": ["command check-proof", "name certify"], "quasi_periodic": ["study quasi-periodic"],
     "stores": [], "traces": [], "wear_life": ["study wear", "name wear_life", "view wear_life"],
