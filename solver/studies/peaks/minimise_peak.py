@@ -24,9 +24,8 @@ from solver.jit.fourier import Real
 from solver.jit.timer import clock
 from solver.results.watch import shows_progress
 from solver.scene.scene import Scene
-from solver.studies.peaks.envelope_minimum import DOUBT, Lowest, flat, minima, rows_at
+from solver.studies.peaks.envelope_minimum import DOUBT, NEAR, Lowest, flat, minima, rows_at, with_further
 from solver.studies.peaks.peak_plateau import Plateau, all_level, choose, dips, interval, look_at
-from solver.studies.peaks.secondary_minima import NEAR, with_further
 from solver.studies.peaks.survey import RESPONSES, Allowance, HaltedError, Look, OnLook, TrackingPace
 from solver.studies.peaks.track_results import ActivePeak, Basin, ChosenBy, LeastPeak, TrackStatus
 from solver.studies.peaks.tracker import Tracker, tighten
