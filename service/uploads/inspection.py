@@ -21,6 +21,7 @@ from typing import Any
 
 from service.errors import InvalidRequestError, QueueFullError, UnreadableUploadError, issues_to_json
 from service.workers.processes import EndedError, told_apart
+from solver.first_use import on_demand
 
 MEMORY_BYTES = 2 * 1024**3
 """Most that one reader may take, and all of them together beside what they are born with."""
@@ -156,7 +157,8 @@ def _answer(task: str, argument: Any) -> dict[str, Any]:
     from solver.matrices.matrix_files import MatrixFileError
 
     tasks: dict[str, Callable[[Any], Any]] = {
-        _DESCRIBE: lambda names: (_join(*names), _describe(names[0])), _RESOLVE: _resolve, _LOOK: _look,
+        _DESCRIBE: lambda names: (_join(*names), _describe(names[0])), _RESOLVE: _resolve,
+        _LOOK: lambda asked: on_demand("service.uploads.matrix_summary:look")(asked),
     }  # fmt: skip
     try:
         return {"found": tasks[task](argument)}
@@ -262,9 +264,3 @@ def _resolve(scene: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(tables, dict):
         raise TypeError(f"the structure is {type(tables).__name__}")
     return as_json(tables)
-
-
-def _look(asked: dict[str, Any]) -> dict[str, Any]:
-    from service.uploads.matrix_summary import look
-
-    return look(asked)

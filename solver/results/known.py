@@ -246,6 +246,15 @@ class Verdict(Piece):
         return f"{self.stable.value}: {self.ground}"
 
 
+TAKES_LONG = "Floquet multipliers would take about"
+
+
+def stable_pairs(found: Mapping[str, Any], of: str = "stable") -> list[tuple[str, str]]:
+    """Return whether a response is stable; nothing where that would take long and was not asked for."""
+    known = "stable" in found and found["stable"] and not found["stable_ground"].startswith(TAKES_LONG)
+    return [(of, f"{found['stable']}: {found['stable_ground']}")] if known else []
+
+
 def worst(verdicts: Sequence[Verdict]) -> Verdict:
     """Return the verdict of several responses: no if one is not stable, yes if all are."""
     if not verdicts:

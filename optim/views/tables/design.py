@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from solver.results import units
-from solver.results.known import known_pairs, note_pairs
+from solver.results.known import known_pairs, note_pairs, stable_pairs
 from solver.results.measures import Measured
 from solver.results.order_statistics import quantile_words
 from solver.results.told import Block, ResultTable, Summary
@@ -203,8 +203,7 @@ def _errors(found: Json) -> Pairs:
     pairs = [] if error is None else [("estimated error", units.length(error))]
     # The flags and open peaks are among the warnings.
     pairs = [pair for pair in known_pairs(found, besides=("peaks_open",)) if pair[0] != "note"] or pairs
-    if "stable" in found:
-        pairs.append(("stable", f"{found['stable']}: {found['stable_ground']}"))
+    pairs += stable_pairs(found)
     warnings = found.get("warnings", ())
     pairs += [("warning", words) for words in warnings]
     return pairs + [pair for pair in note_pairs(found) if pair[1] not in warnings]

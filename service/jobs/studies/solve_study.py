@@ -81,6 +81,9 @@ class Solve(Study, HarmonicRequest):
         default=False,
         description="Prove the response and enclose its amplitude, where contacts are piecewise linear.",
     )
+    multipliers: Annotated[bool, Field(strict=True)] = Field(
+        default=False, alias="stability", description="Floquet multipliers, however long they take."
+    )
     every: Annotated[bool, Field(strict=True)] = Field(
         default=False,
         alias="all",
@@ -112,14 +115,16 @@ class Solve(Study, HarmonicRequest):
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
         """Solve the balance, once or from many starts: the answer is then the largest solution, with all."""
         import solver
+        from solver.response.stability.multipliers import verdict_of
 
         given = with_effects(asked)
         search = {key: given.pop(key) for key in ("starts", "seed") if key in given}
-        proof = given.pop("certify", False)
+        proof, judged = given.pop("certify", False), given.pop("multipliers", False)
         if not given.pop("every", False):
             one = solver.solve(scene, **given)
             plain = one if one.converged else None
-            answer = Answer(plain, one.to_json(), one.reached, one.status.value, one.plot)
+            stable = verdict_of(solver.stability(one)).to_json() if judged and one.converged else {}
+            answer = Answer(plain, one.to_json() | stable, one.reached, one.status.value, one.plot)
             if not proof or not one.converged:
                 return answer
             proved = solver.certify(one, should_stop=watch.should_stop)

@@ -43,6 +43,7 @@ from solver.linear.model import LinearModel
 from solver.results.told import Piece
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import Scene
+from solver.wording import listing
 
 PROVEN, NOT_KNOWN = "proven", "not known"
 MARGIN = 0.999  # what rounding may leave of a bound that is below 1
@@ -91,7 +92,7 @@ def uniqueness(scene: Scene, frequency_hz: float) -> Uniqueness:
         return Uniqueness(unique=PROVEN, ground=MONOTONE)
     if all(contact.keeps_together for contact in scene.contacts):
         return Uniqueness(unique=NOT_KNOWN, ground=_POWER)
-    others = ", ".join(contact.name for contact in scene.contacts if not contact.keeps_together)
+    others = listing([contact.name for contact in scene.contacts if not contact.keeps_together])
     unknown = Uniqueness(unique=NOT_KNOWN, ground=_MAY_BE.format(others))
     in_time = model.extra is None or model.extra.is_real
     known = in_time and model.every_diameter and not (model.prescribed or model.points)

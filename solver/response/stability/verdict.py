@@ -18,7 +18,7 @@ from solver.response.stability.cost import forecast
 from solver.response.stability.multipliers import verdict_of
 from solver.response.stability.uniqueness import MONOTONE, monotone
 from solver.results import units
-from solver.results.known import Stable, Verdict
+from solver.results.known import TAKES_LONG, Stable, Verdict
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ _STARTS = 8  # of the search for a stable response beside one that is not
 # Of that search, how many of its parts run: starts, and branches that are followed both ways.
 _PARTS, _UNKNOWNS = 20, 200  # with so many unknowns; with more fewer, by their square
 _NO_SOLUTION = "there is no solution"
-_LONG = "Floquet multipliers would take about {}: stability() computes them"
+_LONG = TAKES_LONG + " {}: stability() computes them, --stability for a command"
 _BELOW = Verdict(stable=Stable.NOT_KNOWN, ground="the peaks above it are as much as is judged by itself")
 _ANOTHER = "; a stable response has half peak to peak {} there"
 _NONE_FOUND = "; no stable response was found there"

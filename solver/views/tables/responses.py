@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from solver.results import units
-from solver.results.known import BAND_OPEN, FLAGS, between_points, drift_words, flag_words, note_pairs
+from solver.results.known import (
+    BAND_OPEN,
+    FLAGS,
+    between_points,
+    drift_words,
+    flag_words,
+    note_pairs,
+    stable_pairs,
+)
 from solver.results.measures import HALF_PEAK_TO_PEAK, MAX_ABS, WORDS, Measured
 from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter
@@ -16,6 +25,7 @@ Pairs = list[tuple[str, str]]
 
 ROUNDING = 1e-14  # share of the largest harmonic that may be left where there is none
 _SOLUTION_COLUMNS = ("half peak to peak", "mean", "", "largest multiplier", "found by", "residual forces")
+_EACH_CONTACT = 20  # of more contacts it is counted how many are in each state
 _EFFECT_COLUMNS = ("used", "effect", "reason")
 
 
@@ -57,9 +67,12 @@ def solution(found: Json) -> Iterator[Block]:
         pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of {of}"))
     pairs += proved([found["certificate"]] if found.get("certificate") else [])
     pairs.append(("harmonics 1 to 5", _harmonics(found["harmonics"])))
-    pairs += [(f"contact {name}", state) for name, state in found["contacts"].items()]
-    if "stable" in found:
-        pairs.append(("stable", f"{found['stable']}: {found['stable_ground']}"))
+    states = found["contacts"]
+    pairs += [(f"contact {name}", state) for name, state in states.items()][:_EACH_CONTACT]
+    if len(states) > _EACH_CONTACT:
+        counts = Counter(states.values()).items()
+        pairs.append((f"all {len(states)}", ", ".join(f"{count}: {state}" for state, count in counts)))
+    pairs += stable_pairs(found)
     if "unique" in found:
         pairs.append(("one response alone", f"{found['unique']}: {found['unique_ground']}"))
     pairs += _notes(found)
@@ -136,8 +149,7 @@ def branch(found: Json) -> Iterator[Block]:
     pairs = [*Measured.of_result(found).pairs, *_peaks(found, path)]
     if found["error_estimate"] is not None:
         pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of the highest"))
-    if found.get("stable"):
-        pairs.append(("stable at the peak", f"{found['stable']}: {found['stable_ground']}"))
+    pairs += stable_pairs(found, "stable at the peak")
     if found.get("mean_undetermined"):
         pairs.append(("note", "at the highest peak " + FLAGS["mean_undetermined"]))
     if found["band_hz"] is not None:

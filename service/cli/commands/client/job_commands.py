@@ -81,7 +81,10 @@ def show_designs(found: Mapping[str, Any], *, as_json: bool) -> None:
         (
             one["id"],
             one["scene"],
-            ", ".join(_chosen(name, variable["value"]) for name, variable in one["variables"].items()),
+            ", ".join(
+                name if of["value"] is None else f"{name} = {parameter(name, of['value'])}"
+                for name, of in one["variables"].items()
+            ),
             "" if one["peak"] is None else units.length(one["peak"]["value"]),
             "" if one["band_hz"] is None else f"{units.number(one['band_hz'])} Hz",
             "yes" if one["reached"] else "no",
@@ -89,10 +92,6 @@ def show_designs(found: Mapping[str, Any], *, as_json: bool) -> None:
         for one in found["items"]
     ]
     print_table("Stored designs", ("id", "scene", "design", "peak", "band", "reached"), rows)
-
-
-def _chosen(name: str, value: float | None) -> str:
-    return name if value is None else f"{name} = {parameter(name, value)}"
 
 
 def listed(ask: Callable[..., Iterator[_T]], count: int | None, **filters: Any) -> list[_T]:

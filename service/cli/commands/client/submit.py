@@ -60,15 +60,10 @@ _DATA, _COLUMN = "key_data", "--column"
 def command_of(kind: JobKind) -> Any:
     """The command that submits a job of a kind."""
     alone = typer.Typer(add_completion=False, rich_markup_mode=None)
-    take = keyed(submission(kind, _local(kind.name)))
+    entry = TOP.get(kind.name)  # computes here what the kind computes on a service, if there is one
+    take = keyed(submission(kind, entry.function() if isinstance(entry, CommandEntry) else None))
     alone.command(kind.name, help=f"{kind.summary}\n\nSubmitted as a job.")(take)
     return typer.main.get_command(alone)
-
-
-def _local(name: str) -> Command | None:
-    """The command that computes here what a kind computes on a service, if there is one."""
-    entry = TOP.get(name)
-    return entry.function() if isinstance(entry, CommandEntry) else None
 
 
 def submission(kind: JobKind, local: Command | None) -> Command:
