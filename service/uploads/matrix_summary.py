@@ -19,7 +19,6 @@ from solver.errors import FieldError, Issue, SceneError, Shown
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.matrices.craig_bampton import Reduced
     from solver.matrices.load_set import MatrixSet
     from solver.matrices.sectors.sector_reduction import ReducedSector
     from solver.scene.scene import Scene
@@ -53,8 +52,11 @@ def look(asked: Mapping[str, Any]) -> dict[str, Any]:
         omega2 = None
     else:
         given = _read(tables)
-        size = int(given.matrices["K"].shape[0])
-        report |= {"rows": size, "matrices": _entries(given), "held": given.held, **_named(given)}
+        entries = [
+            {"name": key, "rows": int(matrix.shape[0]), "entries": int(matrix.nnz)}
+            for key, matrix in given.matrices.items()
+        ]
+        report |= {"rows": given.size, "matrices": entries, "held": given.held, **_named(given)}
         # A sector alone is not held where it meets the others: its own frequencies say nothing.
         known = structure.get("dofs") or structure.get("sectors") is not None
         omega2 = None if known else _lowest(given, report["notes"])
@@ -89,13 +91,6 @@ def _read(tables: dict[str, Any]) -> MatrixSet:
     except FieldError as error:
         raise SceneError([error.issue.below("structure")]) from error
     return given
-
-
-def _entries(given: MatrixSet) -> list[dict[str, Any]]:
-    return [
-        {"name": key, "rows": int(matrix.shape[0]), "entries": int(matrix.nnz)}
-        for key, matrix in given.matrices.items()
-    ]
 
 
 def _named(given: MatrixSet) -> dict[str, Any]:
@@ -166,7 +161,7 @@ def _scene(
         }  # fmt: skip
     reduced = None
     if given.matrices:
-        size = int(given.matrices["K"].shape[0])
+        size = given.size
         if size > MOST_DOFS and "keep_modes" not in tables:
             raise SceneError.of(
                 ("structure", "keep_modes"), _TOO_LARGE.format(size=size, most=MOST_DOFS), named=False
@@ -183,7 +178,7 @@ def _scene(
     return {
         "scene": {**body, "structure": {"kind": "matrices", **structure}},
         "resolved": as_json(kept),
-        "reduction": None if reduced is None else _kept(reduced, scene),
+        "reduction": None if reduced is None else reduced.facts(scene.structure.dofs),
         **_frequencies(given, omega2, notes),
     }
 
@@ -201,23 +196,13 @@ def _sector(
         refuse(given, reduced=isinstance(cyclic, Mapping) and "keep_modes" in cyclic)
     except FieldError as error:
         raise SceneError([error.issue.below("structure")]) from error
-    return kept_sector(structure, asked["excitation"], int(given.matrices["K"].shape[0]))
+    return kept_sector(structure, asked["excitation"], given.size)
 
 
 _TOO_LARGE = (
     "the model has {size} rows, {most} are the most as they stand: reduce it onto the DOFs named and some "
     "modes of the rest, say 20"
 )
-
-
-def _kept(reduced: Reduced, scene: Scene) -> dict[str, Any]:
-    """What a reduction kept, and what it is good for."""
-    quality = reduced.quality
-    return {
-        "modes": reduced.modes, "highest_hz": reduced.highest_hz, "good_to_hz": quality.good_to_hz,
-        "held_hz": quality.held_hz.tolist(), "static_residual": quality.static_residual,
-        "mass_carried": dict(zip(scene.structure.dofs, quality.mass_carried.tolist(), strict=True)),
-    }  # fmt: skip
 
 
 FORCE = 1.0
@@ -267,22 +252,21 @@ def started(asked: Mapping[str, Any], structure: Mapping[str, Any]) -> tuple[Sce
     hz = math.sqrt(max(float(omega2[first]), 0.0)) / (2.0 * math.pi) or 1.0
     pushed = float(abs(moving[given["dof"]][first]))
     rubbing = model.ports_at(at)[0] @ found.psi[:, order]
+
+    def load(rubbed: float) -> float:  # whose friction is of the size of the excitation, both in one mode [N]
+        ratio = pushed / rubbed if rubbed > 1e-3 * pushed else 10.0
+        return _FORCE_AT_OPTIMUM * FORCE * max(ratio, 0.1) / FRICTION
+
     contacts = [
         {
             **contact, "kt": _digits(1.0 / float(np.sum(np.abs(moved[rigid:]) ** 2) or 1.0)), "mu": FRICTION,
-            "N0": _digits(_load(pushed, float(abs(moved[first])))),
+            "N0": _digits(load(float(abs(moved[first])))),
         }
         for contact, moved in zip(asked["contacts"], rubbing, strict=True)
     ]  # fmt: skip
     raw |= {"contacts": contacts}
     raw["observe"] = {**asked["observe"], "band": [_digits(0.5 * hz, 6), _digits(2.0 * hz, 6)]}
     return Scene.from_dict(raw), omega2
-
-
-def _load(pushed: float, moved: float) -> float:
-    """The normal load whose friction is of the size of the excitation, both in one mode [N]."""
-    ratio = pushed / moved if moved > 1e-3 * pushed else 10.0
-    return _FORCE_AT_OPTIMUM * FORCE * max(ratio, 0.1) / FRICTION
 
 
 def _digits(value: float, digits: int = 3) -> float:

@@ -25,6 +25,7 @@ from solver.arrays import Real
 from solver.errors import FieldError
 from solver.matrices.diagnostics import rigid_body_modes
 from solver.matrices.matrix_validation import DofTable, one_triangle
+from solver.matrices.normal_modes import SMALL_PIVOT, least_stiffness, undamped_modes
 from solver.matrices.values import ASYMMETRY, MOST_DOFS, MOST_MODES
 
 Array = NDArray[Any]  # real, or complex where the matrices are Hermitian
@@ -37,6 +38,7 @@ FREE = (
 _SHIFT = 1e-13  # shift relative to the largest K_jj / M_jj, where K alone is singular
 _RIGID = 0.1  # modes below this share of the shift are rigid-body modes: they are zero but for rounding
 _FAR = 1e8  # a static solution larger than this, for a unit displacement, means that nothing holds the rest
+_MASSLESS = 1e-14  # 1/ω² relative to the lowest mode's: less is rounding, of rows that move without any mass
 _FIRST = 16  # modes looked for first when only their highest frequency is given
 _BODY = 6
 _NEIGHBOURS = 5  # of the rows that the mass couples to a DOF in use, within which its inverse is solved for
@@ -168,8 +170,12 @@ def _lowest(rest: Interior, count: int) -> tuple[Real, Array]:
     if not count:
         return np.zeros(0), np.zeros((n, 0))
     if n <= DENSE or count > n // 2:
-        values, modes = linalg.eigh(rest.K.toarray(), rest.M.toarray(), subset_by_index=(0, count - 1))
-        return values, modes
+        K, M = rest.K.toarray(), rest.M.toarray()
+        if least_stiffness(M) > SMALL_PIVOT:
+            return linalg.eigh(K, M, subset_by_index=(0, count - 1))  # type: ignore[no-any-return]
+        found = undamped_modes(K, M)  # rows of elements alone move without any mass
+        moving = found.flexibility[:count] > _MASSLESS * found.flexibility[0]
+        return found.omega2[:count][moving], found.phi[:, :count][:, moving]
     inverse = LinearOperator((n, n), matvec=rest.solve, dtype=rest.K.dtype)
     start = np.linspace(1.0, 2.0, n).astype(rest.K.dtype)  # fixed, so that the same files give the same scene
     try:
@@ -301,6 +307,15 @@ class Reduced:
     basis: Annotated[
         Array | None, "The motions of the full model that the coordinates stand for, if asked for, (rows, n)."
     ] = None
+
+    def facts(self, dofs: Sequence[str]) -> dict[str, Any]:
+        """What was kept and what it is good for, for programs, with the names of the DOFs in use."""
+        quality = self.quality
+        return {
+            "modes": self.modes, "highest_hz": self.highest_hz, "good_to_hz": quality.good_to_hz,
+            "held_hz": quality.held_hz.tolist(), "static_residual": quality.static_residual,
+            "mass_carried": dict(zip(dofs, quality.mass_carried.tolist(), strict=True)),
+        }  # fmt: skip
 
 
 def craig_bampton(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -158,6 +159,8 @@ def notes(found: MatrixSet, omega2: Real) -> list[str]:
     if found.held:
         said.append(f"{found.held} rows that a boundary condition holds were left out")
     rigid = rigid_body_modes(omega2)
+    if found.inner.any():
+        said.append(f"{found.counted}: their nodes are none of the deck's; they follow, and need no names")
     if rigid:
         said.append(
             f"{rigid} rigid-body mode{'s' if rigid > 1 else ''}: the body is not held. If it should be, its "
@@ -199,12 +202,22 @@ def _implausible(first: float) -> str:
 
 def total_mass(found: MatrixSet) -> tuple[str, float] | None:
     """The mass that moves in one direction [kg], with its name; None if the rows are not labelled."""
-    if found.labels is None or "M" not in found.matrices:
-        return None
-    best: tuple[str, float] | None = None
-    for direction in ("UX", "UY", "UZ"):
-        moved = np.array([label.component == direction for label in found.labels], dtype=np.float64)
-        mass = float(moved @ (found.matrices["M"] @ moved))
-        if moved.any() and (best is None or mass > best[1]):
-            best = (direction, mass)
-    return best
+    masses = {direction: float(moved @ force) for direction, moved, force in _moved(found)}
+    return max(masses.items(), key=lambda one: one[1], default=None)
+
+
+def mass_carried(found: MatrixSet, motions: Real) -> dict[str, float]:
+    """The share of the mass in each direction that M-orthonormal motions of the rows carry, (n, r)."""
+    return {
+        direction: float(np.sum((force @ motions) ** 2) / (moved @ force))
+        for direction, moved, force in _moved(found)
+    }
+
+
+def _moved(found: MatrixSet) -> Iterator[tuple[str, Real, Real]]:
+    """Each direction in which rows are labelled, with that motion of all nodes and the inertia against it."""
+    for direction in ("UX", "UY", "UZ") if "M" in found.matrices else ():
+        here = [label.component == direction for label in found.labels or ()]
+        moved = np.array(here, dtype=np.float64) * ~found.inner
+        if moved.any():
+            yield direction, moved, found.matrices["M"] @ moved

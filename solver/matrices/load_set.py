@@ -50,6 +50,25 @@ class MatrixSet:
         """The row of a label (zero-based); None if there is none."""
         return None if self.labels is None or label not in self.labels else self.labels.index(label)
 
+    @property
+    def size(self) -> int:
+        """How many rows the matrices have; 0 without any."""
+        return next((int(matrix.shape[0]) for matrix in self.matrices.values()), 0)
+
+    @property
+    def inner(self) -> NDArray[np.bool_]:
+        """The rows of elements alone, as of incompatible modes: their nodes are none of the deck's."""
+        known = None if self.deck is None else self.deck.nodes
+        return np.array([known is not None and label.node not in known for label in self.labels or ()], bool)
+
+    @property
+    def counted(self) -> str:
+        """How many rows there are."""
+        own = int(self.inner.sum())
+        return f"{self.size} rows" + (
+            f" ({own} of them elements' own, such as incompatible modes)" if own else ""
+        )
+
     def name(self, row: int) -> str:
         """A row by its number and, where it is known, its label."""
         return f"row {row}" if self.labels is None else f"row {row} ({self.labels[row]})"
@@ -189,8 +208,7 @@ def in_si(found: MatrixSet, units: str) -> MatrixSet:
     along, about = UNITS[units]
     if along == 1.0:
         return found
-    size = next(iter(found.matrices.values())).shape[0]
-    turns = np.array([label.rotation for label in found.labels or ()] or [False] * size)
+    turns = np.array([label.rotation for label in found.labels or ()] or [False] * found.size)
     scale = diags_array(np.sqrt(np.where(turns, about, along)))
     scaled, parts = (
         {key: coo_array(scale @ csr_array(matrix) @ scale) for key, matrix in given.items()}

@@ -153,7 +153,7 @@ def _all_rows(found: Sources, given: MatrixSet | None) -> dict[str, int | str]:
     from solver.matrices.matrix_files import MatrixFileError, read_modes
 
     if given is not None:
-        size = next(iter(given.matrices.values())).shape[0]
+        size = given.size
     else:
         try:
             size = read_modes(found.roles["modes"]).size

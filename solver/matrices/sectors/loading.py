@@ -246,7 +246,7 @@ def _check_sizes(found: MatrixSet) -> None:
 
 def check_part_sizes(found: MatrixSet) -> None:
     """Raise SceneError unless parts have the rows of M and K."""
-    rows = next(iter(found.matrices.values())).shape[0]
+    rows = found.size
     for name, matrix in found.parts.items():
         if matrix.shape[0] != rows:
             raise SceneError.of(
