@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +47,8 @@ if TYPE_CHECKING:
     from solver.matrices.load_set import MatrixSet
     from solver.scene.scene import Scene
 
+MODES = 40  # of the rest that are kept beside the DOFs of faces before motions are chosen for the contacts
+SMALL = 100  # rows up to which a model with faces is kept as it is
 _RATIO = 0.001  # of a structure whose files hold no damping, which would have no bound at resonance
 
 
@@ -55,15 +57,21 @@ def import_scene(asked: ImportOptions) -> None:
     """Make a scene of matrices or modes in files.
 
     The files are read and checked first. The scene refers to them or, with --reduce, to the reduced model,
-    which is written beside it. Without --contact or --patch a template of a contact stands in the scene. With
-    --sectors the matrices are of one sector of a disk, reduced at every nodal diameter that is met.
+    which is written beside it; with --patch it is one in few motions for the contacts unless another way is
+    asked for. Without --contact or --patch a template of a contact stands in the scene. With --sectors the
+    matrices are of one sector of a disk, reduced at every nodal diameter that is met.
     """
     target = new_file("--out", asked.out, (".toml",))
     _check_reduction(asked)
     read = _read(asked)
+    large = read.given is not None and read.given.size > SMALL
+    in_motions = asked.for_contacts and (large or asked.modes is not None)
+    keeps_faces = in_motions and "C" in read.found.roles
+    if keeps_faces:
+        asked = replace(asked, reduce_once=True, modes=MODES if asked.modes is None else asked.modes)
     with ExitStack() as undo:
         structure, table, written = read.found.table(target), read.table, None
-        if asked.reduce_once:
+        if asked.reduce_once or in_motions:
             path = reduced_file(asked, target)
             undo.callback(path.unlink, missing_ok=True)
             written = _reduced(read, asked, path)
@@ -74,16 +82,18 @@ def import_scene(asked: ImportOptions) -> None:
             read=read, target=target, structure=structure, dofs=table, observe=asked.observe,
             excitation=excitation(asked.forces, asked.excite, next(iter(table))),
         )  # fmt: skip
-        scene, frequencies, said = _made(raw, written, asked.start, asked.stop)
+        scene, frequencies, said, written = _made(raw, written, asked)
         undo.pop_all()
+    if keeps_faces:
+        said.append("the files hold damping, which couples modes: every DOF of the faces is kept (--reduce)")
     _report(scene, target, frequencies, written, read.given, said, asked.as_json)
 
 
 def _check_reduction(asked: ImportOptions) -> None:
     """Refuse options that go with --reduce without it, or not with it."""
-    of_reduced = (asked.modes, asked.up_to, asked.reduced)
+    of_reduced = (asked.up_to,) if asked.for_contacts else (asked.modes, asked.up_to, asked.reduced)
     if not asked.reduce_once and any(each is not None for each in of_reduced):
-        raise InputError("`--modes`, `--up-to` and `--reduced` go with --reduce")
+        raise InputError("`--modes` and `--reduced` go with --reduce or --patch, `--up-to` with --reduce")
     if asked.reduce_once and asked.keep_modes is not None:
         raise InputError("`--keep-modes` reduces on every load, --reduce once: keep one of them")
     if asked.mistune and not (asked.reduce_once and asked.sectors is not None):
@@ -130,10 +140,18 @@ def _read(asked: ImportOptions) -> _Read:
 
 def _referring(read: _Read, keep_modes: int | None, target: Path) -> dict[str, object]:
     """Return what [structure] says beside the names of its files, which are a structure."""
+    from solver.matrices.diagnostics import refuse
+
     kept: dict[str, object] = {} if keep_modes is None else {"keep_modes": keep_modes}
     of, given = read.of, read.given
-    gone = None if of is None else _gone(given, of)
-    _checked(given, reduced=keep_modes is not None, gone=gone)
+    if given is None and of is not None:
+        raise InputError("`--sectors` is for matrices, not for modes")
+    if given is not None:
+        gone = None if of is None else checked_boundaries(given, of).elimination(given.size, of.sectors)
+        try:
+            refuse(given, reduced=keep_modes is not None, gone=gone)
+        except ValueError as error:
+            raise InputError(f"`FILES`: {error}") from error
     if of is not None:
         return {"sectors": of.sectors, "cyclic": of.joined(target) | kept}
     if given is not None and given.remarks and read.deck is not None:
@@ -142,19 +160,36 @@ def _referring(read: _Read, keep_modes: int | None, target: Path) -> dict[str, o
 
 
 def _made(
-    raw: _SceneTables, written: ReducedModel | WrittenSector | None, start: float | None, stop: float | None
-) -> tuple[Scene, list[float], list[str]]:
-    """Write the scene; return it, its natural frequencies [Hz] and what is to be said of it."""
-    found, undamped = raw.read.found, not _damped(raw.read.found)
+    raw: _SceneTables, written: ReducedModel | WrittenSector | None, asked: ImportOptions
+) -> tuple[Scene, list[float], list[str], ReducedModel | WrittenSector | None]:
+    """Write the scene; return it, its natural frequencies [Hz], what is to be said, and the reduction."""
+    import solver
+    from solver.matrices.diagnostics import notes
+    from solver.matrices.load_set import MatrixSet
+    from solver.matrices.matrix_files import read_modes
+
+    found, modes = raw.read.found, raw.read.found.roles.get("modes")
+    undamped = "C" not in found.roles and (modes is None or read_modes(modes).damping_ratio is None)
     if undamped:
         raw.structure["damping_ratio"] = _RATIO
-    omega2 = _omega2(_load(raw.table([1.0, 2.0], bare=True), raw.target.parent))
+    omega2 = _omega2(raw.table([1.0, 2.0], bare=True), raw.target.parent)
     frequencies = [math.sqrt(max(float(value), 0.0)) / (2.0 * math.pi) for value in omega2]
-    scene = _write(raw.target, raw.table(band(start, stop, frequencies)), found, written)
-    said = [*_notes(raw.read.given, omega2), *found_by_position(raw.read.of)]
+    between = band(asked.start, asked.stop, frequencies)
+    if isinstance(written, ReducedModel) and not asked.reduce_once:
+        written = written.for_contacts(raw.table(between), asked.modes)
+        raw = replace(raw, structure=written.table(raw.target) | {"damping_ratio": _RATIO})
+    given, remarks = raw.read.given or MatrixSet(matrices={}), []
+    if written is not None:
+        made = ", ".join(path.name for path in dict.fromkeys(found.roles.values()))
+        good = f"good to {written.good_to_hz:.5g} Hz (frequencies exact to 0.1 %)"
+        remarks.append(f"Reduced from {given.size} rows of {made}; {good}.")
+    with whole(raw.target) as temporary:
+        temporary.write_text(toml(raw.table(between), remarks), encoding="utf-8")
+        scene = solver.load_scene(temporary)
+    said = [*notes(given, omega2), *found_by_position(raw.read.of)]
     if undamped:
         said.append(f"the files hold no damping: the scene has damping_ratio = {_RATIO:g}; put yours there")
-    return scene, frequencies, said
+    return scene, frequencies, said, written
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -188,7 +223,7 @@ def _reduced(read: _Read, asked: ImportOptions, path: Path) -> ReducedModel | Wr
         raise InputError("`--reduce` is for matrices; modes are reduced already")
     rows = rows_of(read.table, given)
     if of is None:
-        return reduce(given, rows, asked.modes, asked.up_to, path)
+        return reduce(given, rows, asked.modes if asked.reduce_once else MODES, asked.up_to, path)
     if asked.up_to is not None:
         raise InputError("`--up-to` is not for a sector: give --modes N, as many at each nodal diameter")
     from solver.matrices.values import METRES
@@ -196,77 +231,18 @@ def _reduced(read: _Read, asked: ImportOptions, path: Path) -> ReducedModel | Wr
     return reduce_disk(given, rows, asked.modes, of, path, tuple(read.found.parts), METRES[read.found.units])
 
 
-def _gone(given: MatrixSet | None, of: DiskOptions) -> Any:
-    """How the high boundary of a sector follows whose files the scene refers to."""
-    if given is None:
-        raise InputError("`--sectors` is for matrices, not for modes")
-    size = int(next(iter(given.matrices.values())).shape[0])
-    return checked_boundaries(given, of).elimination(size, of.sectors)
-
-
-def _damped(found: Sources) -> bool:
-    """Whether the files hold damping."""
-    from solver.matrices.matrix_files import read_modes
-
-    return "C" in found.roles or (
-        "modes" in found.roles and read_modes(found.roles["modes"]).damping_ratio is not None
-    )
-
-
-def _checked(given: MatrixSet | None, *, reduced: bool, gone: Any) -> None:
-    """Refuse what is no structure."""
-    from solver.matrices.diagnostics import refuse
-
-    if given is None:
-        return
-    try:
-        refuse(given, reduced=reduced, gone=gone)
-    except ValueError as error:
-        raise InputError(f"`FILES`: {error}") from error
-
-
-def _notes(given: MatrixSet | None, omega2: NDArray[Any]) -> list[str]:
-    from solver.matrices.diagnostics import notes
-    from solver.matrices.load_set import MatrixSet
-
-    return notes(given if given is not None else MatrixSet(matrices={}), omega2)
-
-
-def _load(raw: dict[str, object], folder: Path) -> Scene:
-    from solver.matrices.scene_files import with_files
-    from solver.scene.scene import Scene
-
-    return Scene.from_dict(with_files(raw, folder))
-
-
-def _omega2(scene: Scene) -> NDArray[Any]:
+def _omega2(raw: dict[str, object], folder: Path) -> NDArray[Any]:
     """Squares of the natural frequencies without contacts [rad²/s²], ascending."""
     import numpy as np
 
     from solver.linear.assembly import linear_model
     from solver.matrices.normal_modes import undamped_modes
+    from solver.matrices.scene_files import with_files
+    from solver.scene.scene import Scene
 
-    model = linear_model(scene)
+    model = linear_model(Scene.from_dict(with_files(raw, folder)))
     K, _, M = (each[0] for each in model.plain(model.diameters(np.ones(1, np.int64))))
     return np.sort(undamped_modes(K, M).omega2)
-
-
-def _write(
-    target: Path, raw: dict[str, Any], found: Sources, written: ReducedModel | WrittenSector | None
-) -> Scene:
-    """Write the scene, whole or not at all, and read it as anyone would."""
-    import solver
-
-    remarks = []
-    if written is not None:
-        made = ", ".join(path.name for path in dict.fromkeys(found.roles.values()))
-        remarks.append(
-            f"Reduced from {written.full} rows of {made}; good to "
-            f"{written.good_to_hz:.5g} Hz (frequencies exact to 0.1 %)."
-        )
-    with whole(target) as temporary:
-        temporary.write_text(toml(raw, remarks), encoding="utf-8")
-        return solver.load_scene(temporary)
 
 
 def _report(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -33,40 +33,70 @@ class ReducedModel:
     path: Path
     reduced: Reduced
     rows: dict[str, int]
-    full: int
+    given: MatrixSet
     seconds: float
+    motions: Annotated[dict[str, Any] | None, "Facts of its motions, if those are for contacts."] = None
 
     @property
     def good_to_hz(self) -> float:
         """Frequency up to which every frequency is exact to 0.1 % [Hz]."""
-        return self.reduced.quality.good_to_hz
+        good = self.reduced.quality.good_to_hz
+        return good if self.motions is None else min(good, self.motions["free_hz"])
 
     def table(self, target: Path) -> dict[str, object]:
         """The table [structure] of a scene at `target`."""
-        name = relative(self.path, target)
-        return {"kind": "matrices", **dict.fromkeys(self.reduced.matrices, name)}
+        keys = list(self.reduced.matrices) if self.motions is None else ["modes"]
+        return {"kind": "matrices", **dict.fromkeys(keys, relative(self.path, target))}
+
+    def for_contacts(self, raw: Mapping[str, Any], count: int | None) -> ReducedModel:
+        """The same, written, in motions for the contacts of the tables of a scene, `count` or enough."""
+        import numpy as np
+
+        from solver.errors import SettingError
+        from solver.matrices.values import Matrix
+        from solver.scene.scene import Scene
+        from solver.studies.contact_reduction import reduce_for_contacts
+
+        start, matrices = time.perf_counter(), {key: Matrix(self.reduced.matrices[key]) for key in "MK"}
+        scene = Scene.from_dict({**raw, "structure": {**raw["structure"], **matrices}})
+        try:
+            found = reduce_for_contacts(scene, count)
+        except SettingError as error:
+            raise InputError(f"`--patch`: {error}; --reduce --modes N keeps every DOF") from error
+        with whole(self.path) as temporary:
+            np.savez_compressed(temporary, omega2=found.modes.omega2, modes=found.modes.modes)
+        facts = found.facts(self.given, self.reduced.basis)
+        return replace(self, motions=facts, seconds=self.seconds + time.perf_counter() - start)
 
     def facts(self) -> dict[str, object]:
         """What the reduction kept, for programs."""
         quality = self.reduced.quality
-        return {
-            "file": str(self.path), "dofs": self.full, "modes": self.reduced.modes,
-            "highest_hz": self.reduced.highest_hz, "good_to_hz": quality.good_to_hz,
-            "held_hz": quality.held_hz.tolist(), "static_residual": quality.static_residual,
-            "mass_carried": dict(zip(self.rows, quality.mass_carried.tolist(), strict=True)),
-            "effective_mass": quality.effective_mass.tolist(),
-            "rigid_body_modes": quality.rigid_body_modes, "shift_hz": quality.shift_hz,
-            "seconds": self.seconds,
+        return self.reduced.facts(list(self.rows)) | {
+            "file": str(self.path), "dofs": self.given.size, "seconds": self.seconds, "motions": self.motions,
+            "effective_mass": quality.effective_mass.tolist(), "shift_hz": quality.shift_hz,
+            "rigid_body_modes": quality.rigid_body_modes,
         }  # fmt: skip
 
     def pairs(self) -> list[tuple[str, str]]:
         """What the reduction kept, for people."""
-        quality, reduced = self.reduced.quality, self.reduced
+        quality, reduced, found = self.reduced.quality, self.reduced, self.motions
+        begun = f"{self.given.counted} to {len(self.rows)} DOFs and {reduced.modes} modes"
+        end = f"in {self.seconds:.1f} s, written to {self.path}"
+        if found is not None:
+            free, stuck, off = found["free_hz"], found["stuck_hz"], found["error"]
+            shares = [f"{100 * share:.1f} % in {way}" for way, share in found["mass_carried"].items()]
+            return [
+                ("reduced", f"{begun}, and those to {found['count']} motions, {end}"),
+                ("motions", f"modes with the contacts free to {free:.5g} Hz and stuck to {stuck:.5g} Hz, "
+                            "static ones under forces and loads"),
+                ("error", "no peak was found to tell it" if off is None else
+                          f"{off:.1e} of the peak's height, against all motions with one harmonic"),
+                ("mass carried", ", ".join(shares)),
+            ]  # fmt: skip
         held = ", ".join(f"{f:.5g}" for f in quality.held_hz[:6]) + (", …" if reduced.modes > 6 else "")
         least = min(zip(quality.mass_carried, self.rows, strict=True), default=(0.0, ""))
         pairs = [
-            ("reduced", f"{self.full} rows to {len(self.rows)} DOFs and {reduced.modes} modes in "
-                        f"{self.seconds:.1f} s, written to {self.path}"),
+            ("reduced", f"{begun} {end}"),
             ("modes kept", f"{held} Hz, the highest {reduced.highest_hz:.5g} Hz, with the DOFs held"
                            if held else "none"),
             ("good to", f"{quality.good_to_hz:.5g} Hz: frequencies up to there are estimated 0.1 % exact; "
@@ -86,7 +116,9 @@ def reduced_file(asked: ImportOptions, target: Path) -> Path:
     from solver.matrices.craig_bampton import WRITTEN
 
     name = asked.reduced or str(target.with_name(f"{target.stem}-reduced.npz"))
-    return new_file("--reduced", name, WRITTEN if asked.sectors is None else (".npz",))
+    return new_file(
+        "--reduced", name, (".npz",) if asked.sectors is not None or asked.for_contacts else WRITTEN
+    )
 
 
 def reduce(
@@ -110,16 +142,16 @@ def reduce(
     try:
         refuse(given, reduced=True)
         dofs = DofTable.read(dict(rows))
-        found = craig_bampton(matrices["M"], matrices["K"], matrices.get("C"), dofs, modes, up_to_hz=up_to)
+        found = craig_bampton(
+            matrices["M"], matrices["K"], matrices.get("C"), dofs, modes, up_to_hz=up_to, keep_basis=True
+        )
     except ValueError as error:
         raise InputError(f"`--reduce`: {error}") from error
     seconds = time.perf_counter() - start
     with whole(path) as temporary:
         write_reduced(temporary, found, list(dofs))
-    return ReducedModel(
-        path=path, reduced=found, rows={name: i for i, name in enumerate(dofs)},
-        full=int(matrices["M"].shape[0]), seconds=seconds,
-    )  # fmt: skip
+    rows = {name: i for i, name in enumerate(dofs)}
+    return ReducedModel(path=path, reduced=found, rows=rows, given=given, seconds=seconds)
 
 
 _Texts = list[str] | None
@@ -139,7 +171,13 @@ _FILES = (
 )
 _DOF = "A DOF in use and its row, zero-based, or its node and component (tip=1203.UX); repeatable."
 _KEEP = "Let the scene refer to the full matrices and reduce them whenever it is loaded."
-_REDUCE = "Reduce a large model once, onto the DOFs in use and modes of the rest."
+_REDUCE = (
+    "Reduce a large model once, onto the DOFs in use and modes of the rest. Left out with --patch, the "
+    "structure is written in few motions besides, chosen for the contacts."
+)
+_MODES = (
+    "With --reduce: modes of the rest to keep. With --patch alone: motions, in place of as many as it takes."
+)
 _LOW = "Nodes of the boundary to the sector before: a set of the deck, or numbers with commas."
 _HIGH = (
     "Those of the boundary to the next sector: where the low one comes by the right-hand turn about the "
@@ -180,7 +218,7 @@ class ImportOptions:
     stop: Annotated[float | None, amount("--to", "HZ", "End of the band of interest.")] = None
     keep_modes: Annotated[int | None, count("--keep-modes", "N", _KEEP)] = None
     reduce_once: Annotated[bool, typer.Option("--reduce", help=_REDUCE)] = False
-    modes: Annotated[int | None, count("--modes", "N", "With --reduce: modes of the rest to keep.")] = None
+    modes: Annotated[int | None, count("--modes", "N", _MODES)] = None
     up_to: Annotated[float | None, amount("--up-to", "HZ", "With --reduce: keep all modes up to here.")] = (
         None
     )
@@ -217,6 +255,12 @@ class ImportOptions:
     mistune: Annotated[_Texts, text("--mistune", "NAME[=FILE]", _MISTUNE)] = None
     formats: Annotated[bool, _FORMATS] = False
     as_json: Json = False
+
+    @property
+    def for_contacts(self) -> bool:
+        """Whether the structure is written in motions for its contacts: of faces, unless it is said how."""
+        otherwise = self.reduce_once or self.keep_modes is not None or self.sectors is not None
+        return bool(self.patches) and not otherwise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
