@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from solver.balance.kernels.slopes import take_slopes
-from solver.contacts.kernels.system import BANDED, SIZE, UNHELD, Evaluation, Receptance, System
+from solver.contacts.kernels.system import BANDED, HELD, SIZE, UNHELD, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Index, Real, coefficient_count, cosine_position
 from solver.jit.lapack import copy_to, dot, invert, set_to
@@ -36,21 +36,19 @@ def factorise_banded(
     system: System, linear: Receptance, point: Evaluation, tangent: Real, weight_u: float, weight_p: float
 ) -> float:
     """Factorise as `solver.balance.kernels.jacobian.factorise`, or return NaN where that has to."""
-    n, nt = coefficient_count(system.ks), point.border.size
+    nt = point.border.size
     if point.counts[BANDED] < 0 or point.counts[UNHELD] > 0:
         point.counts[BANDED] = min(point.counts[BANDED], 0)
         return NOT_BANDED
-    sign, reach = _stiffness_of_ports(system, linear, point), 0
-    if sign != 0.0:
-        reach = _reach(system, point)
-    side = max(reach * n + 1, _of_contacts(system) * n - 1)
-    if sign == 0.0 or _NARROW * side > nt:
+    sign = _stiffness_of_ports(system, linear, point)
+    side = nt if sign == 0.0 else _side(system, point)
+    if _NARROW * side > nt:
         point.counts[BANDED] = -1
         return NOT_BANDED
     take_slopes(system, point)
     _assemble(system, point, side)
     sign *= factorise_band(point.lu, nt, side, point.pivots)
-    point.counts[BANDED], point.counts[SIZE], point.settled[nt] = 1, side, 0.0
+    point.counts[BANDED], point.counts[SIZE], point.counts[HELD], point.settled[nt] = 1, nt, side, 0.0
     if sign != 0.0 and weight_p > 0.0:
         for i in range(nt):
             point.border[i] = weight_u * tangent[i]
@@ -65,7 +63,7 @@ def factorise_banded(
 @apart
 def step_banded(system: System, point: Evaluation, x: Real) -> None:
     """Solve with these factors, in place; see `solver.balance.kernels.jacobian.step_back`."""
-    nt, side = point.border.size, point.counts[SIZE]
+    nt, side = point.border.size, point.counts[HELD]
     _solve(system, point, x[:nt], side)
     if x.size > nt and point.settled[nt] != 0.0:
         x[nt] = (x[nt] - dot(point.border, x[:nt])) / point.settled[nt]
@@ -75,10 +73,10 @@ def step_banded(system: System, point: Evaluation, x: Real) -> None:
 @apart
 def step_banded_transposed(system: System, point: Evaluation, x: Real) -> None:
     """Solve with the transpose of dr/du, x (nt,) in place."""
-    forces = point.work[0, : x.size]
+    forces, side = point.work[0, : x.size], point.counts[HELD]
     copy_to(forces, x)
-    solve_band(point.lu, x.size, point.counts[SIZE], point.pivots, True, forces)
-    _stiffness_times(system, point, point.counts[SIZE], True, forces, x)
+    solve_band(point.lu, x.size, side, point.pivots, True, forces)
+    _stiffness_times(system, point, side, True, forces, x)
 
 
 @compiled
@@ -87,15 +85,6 @@ def _solve(system: System, point: Evaluation, x: Real, side: int) -> None:
     _stiffness_times(system, point, side, False, x, forces)
     copy_to(x, forces)
     solve_band(point.lu, x.size, side, point.pivots, False, x)
-
-
-@compiled
-def _of_contacts(system: System) -> int:
-    """Return the most ports that a contact has."""
-    most = 0
-    for e in range(system.laws.size):
-        most = max(most, system.first_port[e + 1] - system.first_port[e])
-    return most
 
 
 @apart
@@ -116,17 +105,21 @@ def _stiffness_of_ports(system: System, linear: Receptance, point: Evaluation) -
 
 
 @compiled
-def _reach(system: System, point: Evaluation) -> int:
-    """Return how many ports on A⁻¹ couples any two; what is left beyond is rounding."""
-    reach, nc = 0, system.owner.size
+def _side(system: System, point: Evaluation) -> int:
+    """Return how many diagonals lie on either side: of contacts, and of A⁻¹ but for what is rounding."""
+    n, nc, side, reach = coefficient_count(system.ks), system.owner.size, 0, 0
+    own = point.work[0, :nc]
+    for e in range(system.laws.size):
+        side = max(side, (system.first_port[e + 1] - system.first_port[e]) * n - 1)
     for i in range(system.ks.size):
         B = point.responses[i]
         for c in range(nc):
+            own[c] = math.sqrt(_NOTHING * abs(B[c, c]))
+        for c in range(nc):
             for d in range(nc):
-                size = abs(B[c, d].real) + abs(B[c, d].imag)
-                if abs(c - d) > reach and size > _NOTHING * math.sqrt(abs(B[c, c]) * abs(B[d, d])):
+                if abs(c - d) > reach and abs(B[c, d].real) + abs(B[c, d].imag) > own[c] * own[d]:
                     reach = abs(c - d)
-    return reach
+    return max(side, reach * n + 1)
 
 
 @apart
@@ -179,68 +172,78 @@ def _stiffness_times(
 def factorise_band(band: Real, n: int, side: int, pivots: Index) -> float:
     """Factorise a matrix with `side` diagonals on either side in place, rows exchanged.
 
-    Entry (i, j) stands in row i and column j − i + side of `band`, which has room for 3 · side + 1.
+    Entry (i, j) stands in row i and column j − i + side of `band`, which has room for 3 · side + 1. The first
+    columns of a row then have the factors of its column. Two pivots at a time are subtracted from the rows
+    below, which are read and written half as often.
 
     Returns
     -------
     The sign of the determinant, 0.0 if the matrix is singular or not finite.
     """
-    sign, end = 1.0, 0
-    for k in range(n):
-        below = min(k + side, n - 1)
-        pivot, size = k, abs(band[k, side])
-        for r in range(k + 1, below + 1):
-            here = abs(band[r, k - r + side])
-            if here > size:
-                pivot, size = r, here
-        if not (size > 0.0 and math.isfinite(size)):
+    sign, end, waiting = 1.0, 0, np.zeros(side + 1)
+    for k in range(0, n, 2):
+        end, turn = _exchange(band, n, k, end, side, pivots)
+        sign *= turn
+        c, below = k + 1, min(side, n - 1 - k)
+        if turn == 0.0 or c == n:
+            return sign
+        for i in range(below):
+            band[k, i] = waiting[i] = band[c + i, side - 1 - i] / band[k, side]
+            band[c + i, side - i] -= waiting[i] * band[k, side + 1]
+        waiting[below] = 0.0
+        end, turn = _exchange(band, n, c, end, side, pivots)
+        sign *= turn
+        if turn == 0.0:
             return 0.0
-        pivots[k], end = pivot, max(end, min(pivot + side, n - 1))
-        if pivot != k:
-            sign = -sign
-            shift = k - pivot
-            for j in range(side, end - k + side + 1):
-                band[k, j], band[pivot, j + shift] = band[pivot, j + shift], band[k, j]
-        if band[k, side] < 0.0:
-            sign = -sign
-        _subtract(band, k, below, end, side)
+        other = pivots[c] - c
+        waiting[0], waiting[other] = waiting[other], waiting[0]
+        # A row exchanged for the second pivot may reach one column beyond the room of the first one's.
+        count = min(end - c, 2 * side - 1)
+        first, second = band[k, side + 2 : side + 2 + count], band[c, side + 1 : side + 1 + count]
+        set_to(second, second, -waiting[0], first)
+        for i in range(min(side, n - 1 - c)):
+            r, one = c + 1 + i, waiting[i + 1]
+            two = band[c, i] = band[r, side - 1 - i] / band[c, side]
+            row = band[r, side - i : side - i + count]
+            for j in range(count):
+                row[j] -= one * first[j] + two * second[j]
+            if c + count < end:
+                band[r, end - r + side] -= two * band[c, end - c + side]
     return sign
 
 
 @compiled
-def _subtract(band: Real, k: int, below: int, end: int, side: int) -> None:
-    """Subtract row k, from its pivot to column `end`, from those below that have an entry in column k."""
-    count, inverse = end - k, 1.0 / band[k, side]
-    above = band[k, side + 1 : side + 1 + count]
-    for r in range(k + 1, below + 1):
-        at = k - r + side
-        factor = band[r, at] * inverse
-        band[r, at] = factor
-        if factor != 0.0:
-            row = band[r, at + 1 : at + 1 + count]
-            for j in range(count):
-                row[j] -= factor * above[j]
+def _exchange(band: Real, n: int, k: int, end: int, side: int, pivots: Index) -> tuple[int, float]:
+    """Exchange row k for that of its pivot; the last column that rows now reach, and a factor of the sign."""
+    pivot, size = k, abs(band[k, side])
+    for r in range(k + 1, min(k + side, n - 1) + 1):
+        here = abs(band[r, k - r + side])
+        if here > size:
+            pivot, size = r, here
+    if not (size > 0.0 and math.isfinite(size)):
+        return end, 0.0
+    pivots[k], end = pivot, max(end, min(pivot + side, n - 1))
+    if pivot != k:
+        for j in range(side, end - k + side + 1):
+            band[k, j], band[pivot, j + k - pivot] = band[pivot, j + k - pivot], band[k, j]
+    return end, -1.0 if (band[k, side] < 0.0) != (pivot != k) else 1.0
 
 
 @apart
 def solve_band(band: Real, n: int, side: int, pivots: Index, transposed: bool, x: Real) -> None:
     """Solve with the factors of `factorise_band`, or with their transpose; x in place."""
-    if transposed:
-        for k in range(n):
-            x[k] /= band[k, side]
-            for j in range(1, min(2 * side, n - 1 - k) + 1):
-                x[k + j] -= band[k, side + j] * x[k]
-        for k in range(n - 1, -1, -1):
-            for r in range(k + 1, min(k + side, n - 1) + 1):
-                x[k] -= band[r, k - r + side] * x[r]
-            x[k], x[pivots[k]] = x[pivots[k]], x[k]
-        return
     for k in range(n):
-        x[k], x[pivots[k]] = x[pivots[k]], x[k]
-        for r in range(k + 1, min(k + side, n - 1) + 1):
-            x[r] -= band[r, k - r + side] * x[k]
+        if transposed:
+            x[k] /= band[k, side]
+            row = band[k, side + 1 : side + 1 + min(2 * side, n - 1 - k)]
+        else:
+            x[k], x[pivots[k]] = x[pivots[k]], x[k]
+            row = band[k, : min(side, n - 1 - k)]
+        set_to(x[k + 1 : k + 1 + row.size], x[k + 1 :], -x[k], row)
     for k in range(n - 1, -1, -1):
-        total = x[k]
-        for j in range(1, min(2 * side, n - 1 - k) + 1):
-            total -= band[k, side + j] * x[k + j]
-        x[k] = total / band[k, side]
+        if transposed:
+            x[k] -= dot(band[k, : min(side, n - 1 - k)], x[k + 1 :])
+            x[k], x[pivots[k]] = x[pivots[k]], x[k]
+        else:
+            x[k] -= dot(band[k, side + 1 : side + 1 + min(2 * side, n - 1 - k)], x[k + 1 :])
+            x[k] /= band[k, side]

@@ -53,12 +53,7 @@ def frozen_arc(
             norm = complete(system, linear, u, p, norm, point)
             return norm <= ACCEPTED, iteration, p, norm
         if norm <= ACCEPTED and norm > 0.5 * before:
-            return (
-                False,
-                iteration,
-                p,
-                norm,
-            )  # whether rounding allows no better is for Newton's method to say
+            return False, iteration, p, norm  # whether rounding allows no better is for Newton's method
         if iteration == _MOST_SOLVES or norm > 1e3 * max(before, 1e-3):
             return False, iteration, p, norm
         if iteration > 2 and norm > _SLOWEST * before:
