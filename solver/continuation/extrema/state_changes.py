@@ -25,6 +25,9 @@ FORETOLD, STEEPER = 1e-3, 12.0
 FORETOLD_BESIDE = 1e-2  # the first of them, of an interval beside a change
 MOST_CHANGES = 16  # in one interval of the branch
 MOST_HALVINGS = 4  # of what a change leaves on either side of it
+# From so many contacts on an interval with changes is halved before each of them is closed in on: of many
+# small ones hardly any departs that far once it is short.
+MANY_CONTACTS = 16
 # A contact whose motion, by its slope at an end, changes over an interval by so many times its size may do
 # something else in between and the same again at the other end.
 CHANGES_ALL = 2.0
@@ -51,6 +54,8 @@ class ChangeSearch:
         departs = self._departs(nodes, top, FORETOLD)
         for _ in range(MOST_HALVINGS):
             hiding = self._hiding(nodes, top, departs)
+            if nodes[0].states.size >= MANY_CONTACTS:
+                hiding |= self._wanted(nodes, top, departs)
             if not hiding.any():
                 break
             nodes, _, _ = self._solver.halved(nodes, hiding)
