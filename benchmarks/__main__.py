@@ -43,6 +43,7 @@ CASES = {
     "figures": "stored_sweeps:figures",
     "two-hundred": "large:two_hundred_contacts",
     "reduction": "reduction:reduction",
+    "mesh-day": "mesh_day:mesh_day",
     "sector": "sector:sector",
     "robustness": "robustness:robustness",
     "truth": "truth:truth",

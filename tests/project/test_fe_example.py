@@ -19,12 +19,15 @@ import solver
 from service.cli import main
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-PAGE = (ROOT / "docs" / "fe-example.md").read_text(encoding="utf-8")
-COMMANDS = [
-    line
-    for block in re.findall(r"^```sh\n(.*?)^```$", PAGE, flags=re.MULTILINE | re.DOTALL)
-    for line in block.splitlines()
-]
+PAGE, OF_A_FACE = (ROOT / "docs" / "fe-example.md").read_text(encoding="utf-8").split("\n## A whole face\n")
+
+
+def commands(page: str) -> list[str]:
+    blocks = re.findall(r"^```sh\n(.*?)^```$", page, flags=re.MULTILINE | re.DOTALL)
+    return [line for block in blocks for line in block.splitlines()]
+
+
+COMMANDS = commands(PAGE)
 
 
 def with_the_contact(text: str, page: str = PAGE) -> str:
@@ -78,6 +81,24 @@ def test_the_page_runs_line_by_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert "peak 0.178" in response
     assert all(Path(f"blade-{name}.png").stat().st_size > 10_000 for name in ("peak", "response"))
     the_reduction_is_good_to_what_it_says()
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("beside_docs")
+def test_the_day_with_a_face_runs_line_by_line(capsys: pytest.CaptureFixture[str]) -> None:
+    made, imported, free, loaded, designed, _, checked = (
+        " ".join(run(line, capsys).split()) for line in commands(OF_A_FACE)
+    )
+    assert "1638 rows, 581 nodes, 21 of them on the face" in made
+    assert "to 19 motions" in imported
+    assert re.search(r"error 4\.\de-05 of the peak", imported)
+    assert "peak 4.19" in free
+    assert "peak 3.67" in loaded
+    assert re.search(r"plat\.N0 [\d.]+ N peak [\d.]+ mm", designed)
+    apart = [float(text) for text in re.findall(r"([\d.e-]+) of it apart", checked)]
+    assert len(apart) == 3
+    assert max(apart) <= 2e-3
+    assert Path("face-response.png").stat().st_size > 10_000
 
 
 def the_reduction_is_good_to_what_it_says() -> None:
