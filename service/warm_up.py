@@ -2,7 +2,7 @@
 
 Part of ``make setup`` and ``make test``. All cores compile at once; the machine code is cached on disk and
 serves every process from then on. With ``--first`` only what a response and a design of a scene like the
-paper's call is compiled, in five sixths of the time: ``make demo`` calls no more. Who
+paper's call is compiled, in three fifths of the time: ``make demo`` calls no more. Who
 finds nothing compiled has it done by ``--beside``: both, one after the other, if nobody else is at it. A
 wheel that brings its kernels has those of every shipped scene too (``--scenes``).
 """

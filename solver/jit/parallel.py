@@ -39,8 +39,8 @@ def compile_together(
     Parameters
     ----------
     calls : functions of modules, so that another process finds them.
-    listed : whether kernels that are called by a number, such as those of contact laws, are compiled
-        although none of the calls gave their number.
+    listed : whether kernels are compiled that none of the calls reached, also those that are called by a
+        number, such as those of contact laws.
     processes : how many; one for each core, up to `MOST_PROCESSES`, if left out.
 
     Raises
@@ -176,7 +176,11 @@ class _Team:
         return True
 
     def finish(self) -> None:
-        """Return when nothing is left to do."""
+        """Return when nothing is left to do: of the calls alone if nothing else is wanted."""
+        if not self._also_listed:
+            with self._lock:
+                self._pool = None
+                self._open = {task: each for task, each in self._open.items() if not isinstance(task, bytes)}
         while True:
             while self._help():
                 pass
@@ -185,4 +189,4 @@ class _Team:
                     return
                 _, future = self._open.popitem()
             if future is not None:
-                future.result()
+                self.hand_out(future.result())  # `_more` may be on its way

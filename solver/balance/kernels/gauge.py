@@ -109,7 +109,7 @@ def keep_means(system: System, point: Evaluation, J: Real, n: int) -> None:
                 J[c * n, d * n] += point.gauge[k, c] * system.shift[d] * point.gauge[k, d]
 
 
-@compiled
+@apart
 def _pin_means(system: System, u: Real, point: Evaluation, rhs: Real) -> None:
     """Let a Newton step move the means along `gauge` to where the mean forces are those of first loading.
 

@@ -82,7 +82,7 @@ def _power_share(
     return lost / carried if carried > 0.0 else 0.0
 
 
-@compiled
+@apart
 def _on_stiffer(system: System, linear: Receptance, point: Evaluation, more: Real, out: Real) -> bool:
     """Fill `out` with the residual on springs that are stiffer than the shift by `more`; False: unknown."""
     nc, n = system.owner.size, coefficient_count(system.ks)

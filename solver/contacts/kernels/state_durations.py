@@ -32,7 +32,7 @@ from solver.jit.separate import apart
 from solver.jit.trig_polynomial import FALLING, RISING, at_point, bracketed_root, on_grid, unpack
 
 
-@compiled
+@apart
 def contact_intervals(c: Real, s: Real, degree: int, value: Real, slope: Real, out: Real) -> int:
     """Fill `out` with [begin, end] of every interval with N > 0, when N < 0 somewhere; return their number.
 
@@ -263,7 +263,7 @@ def _march_half(
     return SLIPPING, 2 * count
 
 
-@compiled
+@apart
 def _march_intervals(
     c: Real, s: Real, degree: int, value: Real, slope: Real, tol: float, intervals: Real, n_intervals: int,
     segments: Records,

@@ -143,7 +143,7 @@ def fill_forces(system: System, i: int, moved: float, force: Complex, rise: Comp
             rise[a] = first + moved * second
 
 
-@compiled
+@apart
 def fill_from_matrices(system: System, omega: float, p: float, orders: Integer, out: Any) -> None:
     """Fill the condensed linear part at (ω, λ = p) by inverting Z_k itself.
 

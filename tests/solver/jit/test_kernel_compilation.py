@@ -168,6 +168,23 @@ if __name__ == "__main__":
 
 @pytest.mark.long
 @pytest.mark.parametrize("processes", [1, 2])
+def test_what_no_call_reached_is_left_if_it_is_not_wanted(tmp_path: Path, processes: int) -> None:
+    program = f"""
+import little
+from solver.jit.parallel import compile_together
+
+def two():
+    assert little.sometimes(1.0) == 1.0
+
+if __name__ == "__main__":
+    compile_together([two], listed=False, processes={processes})
+    print("left")
+"""
+    assert said(python(tmp_path, program))[0] == "left\n"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("processes", [1, 2])
 def test_kernels_called_by_number_are_compiled_if_they_are_wanted(tmp_path: Path, processes: int) -> None:
     program = f"""
 import little
