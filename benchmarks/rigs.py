@@ -12,7 +12,7 @@ import numpy as np
 import optim
 import solver
 from benchmarks.harness import expect, table
-from optim.identification.unknowns import read_unknowns
+from optim.identification.fit import read_unknowns
 from solver.arrays import Real
 from stickslip.lab.posterior.reassemblies import Level
 

@@ -74,7 +74,7 @@ from stickslip.lab.all_solutions.residual_forces import (
     amplitude_range as amplitude_range,
 )
 from .response.stability.bifurcations import Switched as Switched, switch_branches as switch_branches
-from .response.stability.uniqueness import Uniqueness as Uniqueness, uniqueness as uniqueness
+from .response.stability.verdict import Uniqueness as Uniqueness, uniqueness as uniqueness
 from .response.sweep import sweep as sweep
 from .response.time_history import (
     hysteresis_loop as hysteresis_loop,
@@ -95,9 +95,9 @@ from .response.worst_wear import (
     worst_wear as worst_wear,
 )
 from .results.base import Shown as Shown, progress_bar as progress_bar
-from .results.dataset import Dataset as Dataset, Variable as Variable
+from .results.files import Dataset as Dataset, Variable as Variable
 from .results.told import Summary as Summary
-from .scene.builder import SceneBuilder as SceneBuilder
+from .scene.templates import SceneBuilder as SceneBuilder
 from .scene.cyclic.annulus import Extent as Extent, annulus as annulus, sectors_needed as sectors_needed
 from .scene.scene import Scene as Scene, load_scene as load_scene, shipped_scenes as shipped_scenes
 from .scene.templates import new_scene as new_scene

@@ -10,7 +10,17 @@ from typing import Any
 import numpy as np
 
 from optim.identification.data.response import ResponseRun
-from optim.identification.fit import MOST_STARTS, STARTS, LocalFit, Noise, Runs, Searched, search
+from optim.identification.fit import (
+    MOST_STARTS,
+    STARTS,
+    LocalFit,
+    Noise,
+    Runs,
+    Searched,
+    Unknowns,
+    read_unknowns,
+    search,
+)
 from optim.identification.identification_result import Estimate, Identification, IdentifyStatus, NotReached
 from optim.identification.information import (
     UNIFORM,
@@ -23,7 +33,6 @@ from optim.identification.information import (
 )
 from optim.identification.model_check import doubts
 from optim.identification.reading import Given, read_data
-from optim.identification.unknowns import Unknowns, read_unknowns
 from optim.problem.checks import DataError, DesignError, is_number, whole
 from optim.problem.uncertainty_input import CONFIDENCE, read_uncertain
 from optim.problem.variables import Real

@@ -21,8 +21,7 @@ from typing import Annotated
 import numpy as np
 
 from optim.identification.data.measured import MeasuredRows
-from optim.identification.fit import HUBER, LocalFit, Runs
-from optim.identification.unknowns import Unknowns
+from optim.identification.fit import HUBER, LocalFit, Runs, Unknowns
 from optim.problem.checks import DesignError, is_number
 from optim.problem.variables import Real
 from solver.balance.balance import Kind, resolve

@@ -2,9 +2,8 @@
 
 Coulomb friction scales: where one variable sets the normal load of every contact, the peak at a load v is
 that of the load v₀ under v₀/v times the excitation, times v/v₀: one curve serves every design. Else a curve
-is followed for each, and its peak has an exact gradient (`solver.modes.peaks.peak_gradient`). One whole
-response at the optimum says how far the curve is off; the correction (`solver.modes.peaks.peak_correction`)
-estimates it without.
+is followed for each, and its peak has an exact gradient. One whole response at the optimum says how far the
+curve is off; the correction estimates it without (both are of `solver.modes.peaks.peak_correction`).
 """
 
 from __future__ import annotations
@@ -25,8 +24,7 @@ from optim.problem.design_problem import Method, Problem
 from optim.problem.variables import BoundedVariable, Real, by_variables, parameter_values, unscaled
 from optim.results.design_result import CurveCheck, DesignResult, DesignStatus
 from solver.jit.timer import clock
-from solver.modes.peaks.peak_correction import corrected_peak
-from solver.modes.peaks.peak_gradient import CurvePeak, peak_at_excitation
+from solver.modes.peaks.peak_correction import CurvePeak, corrected_peak, peak_at_excitation
 from solver.modes.peaks.performance import PerformanceCurve, performance_over
 from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.scene import Scene

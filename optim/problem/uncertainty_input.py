@@ -15,8 +15,8 @@ from optim.problem.uncertainty_set import Coordinate, Disk, How, Scenario, Uncer
 from optim.problem.variables import BoundedVariable, Real
 from solver.balance.balance import Kind, resolve
 from solver.errors import Place, at
+from solver.scene.parameter_paths import STRUCTURE
 from solver.scene.scene import Scene
-from solver.scene.structure_parameters import STRUCTURE
 
 ELLIPSOID = ("centre", "relative", "paths", "half_axes", "shape", "covariance", "confidence", "mistuning")
 MISTUNING = ("of", "spread", "seeds", "values", "within")

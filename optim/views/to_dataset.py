@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.results.dataset import Dataset, Variable
+from solver.results.files import Dataset, Variable
 from solver.scene.parameter_paths import parameter_unit
 from solver.views.to_dataset import attributes, column
 from solver.views.to_dataset import described as described  # of classes that say their data set

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
     from service.jobs.outputs import JobOutput, OnProgress, Progress, ShouldStop
     from service.jobs.stored_figures import SweepRecord
-    from solver.results.dataset import Dataset
+    from solver.results.files import Dataset
     from solver.results.told import Told
     from solver.scene.scene import Scene
 

@@ -27,8 +27,15 @@ from solver.jit.timer import clock
 from solver.marching.kernels import march_state as kernel
 from solver.marching.kernels import taylor as stepping
 from solver.marching.march import RESOLVED, copied, order_of, row_names, settled_state, steps_for, whole
-from solver.marching.march_base import base_begins, base_over
-from solver.marching.march_equations import MarchEquations, as_sparse, equations_of_motion, in_modes, moved_to
+from solver.marching.march_equations import (
+    MarchEquations,
+    as_sparse,
+    base_begins,
+    base_over,
+    equations_of_motion,
+    in_modes,
+    moved_to,
+)
 from solver.marching.march_result import MarchStatus, TransientResult, TransientStatus, turning_points
 from solver.marching.march_start import MarchStart, state_at
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress

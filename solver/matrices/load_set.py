@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array
 
 from solver.matrices.decks.deck import Deck, frames
-from solver.matrices.labels import COMPONENTS, OWN_COMPONENTS, Label
-from solver.matrices.labels import label as parsed
 from solver.matrices.matrix_files import MatrixFileError, labels_beside, read_labelled, read_labels
-from solver.matrices.readers.numbers_in_text import FormatError
+from solver.matrices.readers.numbers_in_text import COMPONENTS, OWN_COMPONENTS, FormatError, Label
+from solver.matrices.readers.numbers_in_text import label as parsed
 from solver.matrices.readers.reader_registry import Labelled, reader_of, suffixes
 from solver.matrices.values import UNITS
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_array, issparse
 
-from solver.matrices.labels import Label
 from solver.matrices.readers import reader_registry as registry
+from solver.matrices.readers.numbers_in_text import Label
 from solver.matrices.readers.reader_registry import MOST_ROWS, ROLES, Labelled, Reader
 from solver.matrices.readers.reader_registry import MatrixFileError as MatrixFileError
 from solver.matrices.values import NormalModes

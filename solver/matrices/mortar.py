@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from solver.arrays import Integer, Real
-from solver.matrices.decks.deck import Deck, positions
-from solver.matrices.sectors.elements import faces_of
+from solver.matrices.decks.deck import Deck, faces_of, positions
 
 _NEAR = 0.01  # share of the least distance of two nodes of a face within which nodes are one place
 _FLAT = 1e-3  # a face thinner than this share of its length is a line

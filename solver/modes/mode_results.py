@@ -75,7 +75,7 @@ class ModalCurve(Drawn):
 class NonlinearMode(ModalCurve):
     """Frequency and damping ratio of a mode over its amplitude; n points along the curve."""
 
-    VIEWS: ClassVar = Views("solver.views", "modes:mode", "modes:mode_figure")
+    VIEWS: ClassVar = Views("solver.views", "disks:mode", "disks:mode_figure")
     DATA: ClassVar = Data(
         "modes", {"point": "amplitude frequency=frequency_hz damping_ratio frequency_error damping_error"
          " max_abs forcing", **OF_CONTACTS, "dof": "dof=scene.dofs",
@@ -158,7 +158,7 @@ class NonlinearMode(ModalCurve):
 class PhaseResonance(ModalCurve):
     """Responses in phase resonance over the amplitude; n points along the curve."""
 
-    VIEWS: ClassVar = Views("solver.views", "modes:mode", "modes:resonance_figure")
+    VIEWS: ClassVar = Views("solver.views", "disks:mode", "disks:resonance_figure")
     DATA: ClassVar = Data(
         "phase-resonance", {"point": "amplitude frequency=frequency_hz excitation max_abs"},
         "mode_number=mode",

@@ -51,8 +51,14 @@ from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
 from solver.linear.model import LinearModel
 from solver.matrices.normal_modes import hermitian
-from solver.response.contact_response import ContactState
-from solver.response.held_contacts import HeldContact, held_contacts, instants_of, mean_range, of_diameters
+from solver.response.contact_response import (
+    ContactState,
+    HeldContact,
+    held_contacts,
+    instants_of,
+    mean_range,
+    of_diameters,
+)
 from solver.response.solution import Solution
 from solver.response.time_history import all_coordinates
 

@@ -18,7 +18,7 @@ from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
     from solver.response.contact_response import ContactResponse
-    from solver.response.stability.uniqueness import Uniqueness
+    from solver.response.stability.verdict import Uniqueness
 
 MEAN_UNDETERMINED = "mean_undetermined"
 HISTORY_DEPENDENT = "history_dependent"
@@ -153,7 +153,7 @@ class Solution(Drawn):
     @property
     def uniqueness(self) -> Uniqueness:
         """Whether the scene is proven to have no other response at this frequency, and why."""
-        found: Uniqueness = on_demand("solver.response.stability.uniqueness:uniqueness")(
+        found: Uniqueness = on_demand("solver.response.stability.verdict:uniqueness")(
             self.scene, self.frequency_hz
         )
         return found

@@ -35,10 +35,12 @@ from solver.jit.fourier import Real
 from solver.jit.timer import clock
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.model import LinearModel
-from solver.response.contact_response import ContactState, code_of, contact_responses
-from solver.response.held_contacts import (
+from solver.response.contact_response import (
+    ContactState,
     HeldContact,
     Room,
+    code_of,
+    contact_responses,
     held_contacts,
     instants_of,
     mean_gain_slopes,

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from solver.results.dataset import Dataset
+    from solver.results.files import Dataset
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,10 +32,9 @@ from solver.scene import parameter_paths as scene_paths
 from solver.scene.bodies import kinematics
 from solver.scene.bodies.body import Body, Load, Node
 from solver.scene.bodies.body_shapes import AnyShape
-from solver.scene.bodies.body_validation import body_issues
+from solver.scene.bodies.body_validation import body_issues, cyclic_issues
 from solver.scene.bodies.kinematics import Form
 from solver.scene.bodies.shape_parts import own_parts, with_shapes
-from solver.scene.cyclic.cyclic_validation import cyclic_issues
 from solver.scene.excitation import with_factor_files
 from solver.scene.linear_terms import (
     Aerodynamics,

@@ -70,7 +70,6 @@ from solver.sensitivity.kernels.adjoint import (
     amplitude_slopes,
 )
 
-TWO_PI = 2.0 * math.pi
 STATIONARY = 1e-10  # largest share of a peak's height that a solution may lie below it
 
 TWO_PI = 2.0 * math.pi

@@ -25,9 +25,9 @@ from solver.results.known import NOTHING_KNOWN, Known
 from solver.results.measures import OF_X, Measured
 from solver.results.watch import shows_progress
 from solver.scene.cyclic.annulus import annulus, sectors_needed
+from solver.scene.parameter_paths import STRUCTURE, named_parts
 from solver.scene.scene import Scene
 from solver.scene.scene_records import CyclicStructure, LumpedStructure, Mass, MatricesStructure
-from solver.scene.structure_parameters import STRUCTURE, named_parts
 from solver.wording import listing, nearest
 
 _ONE_MASS = LumpedStructure(kind="lumped", masses=(Mass(dof="x", m=1.0),))  # stands in for a large structure

@@ -17,8 +17,18 @@ from numpy.typing import NDArray
 
 from solver.errors import MissingExtraError, ResultFileError, SettingError
 from solver.results.base import Shown
-from solver.results.dataset import ROW, Attribute, Dataset, Variable
-from solver.results.files import csv_text, read_netcdf, read_parquet, whole, write_netcdf, write_parquet
+from solver.results.files import (
+    ROW,
+    Attribute,
+    Dataset,
+    Variable,
+    csv_text,
+    read_netcdf,
+    read_parquet,
+    whole,
+    write_netcdf,
+    write_parquet,
+)
 from solver.scene.scene import Scene
 from solver.scene.toml import toml_text
 

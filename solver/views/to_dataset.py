@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.results.dataset import Attribute, Dataset, Variable
+from solver.results.files import Attribute, Dataset, Variable
 from solver.results.told import UNIT, at, keys_and_paths
 from solver.views.io import scene_attributes
 

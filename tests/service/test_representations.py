@@ -16,7 +16,7 @@ from service_helpers import is_problem
 import solver
 from service.cli import main
 from service.rendering.representations import preferred
-from solver.results.dataset import Dataset
+from solver.results.files import Dataset
 
 OFFERED = ("application/json", "text/csv", "application/x-npz")
 FORMS = {

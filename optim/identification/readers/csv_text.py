@@ -15,11 +15,14 @@ import numpy as np
 
 from optim.identification.data.measured_table import Table, split_head
 from optim.identification.readers.data_readers import DataFormat, Head, complex_apart, read_head, table_of
-from optim.identification.readers.number_texts import COMMA, DECIMAL, POINT, columns_of
 from optim.identification.readers.text_layout import (
+    COMMA,
+    DECIMAL,
     LEFT_OUT,
+    POINT,
     Choice,
     Layout,
+    columns_of,
     contradiction,
     heading_unit,
     layout_of,

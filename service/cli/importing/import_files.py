@@ -135,7 +135,7 @@ def dof_table(
 
 
 def _dof(text: str) -> tuple[str, int | str]:
-    from solver.matrices.labels import label
+    from solver.matrices.readers.numbers_in_text import label
 
     name, equals, row = text.rpartition("=")
     if equals and name and re.fullmatch(r"[0-9]{1,12}", row):
@@ -169,7 +169,7 @@ def _all_rows(found: Sources, given: MatrixSet | None) -> dict[str, int | str]:
 
 def rows_of(table: Mapping[str, int | str], given: MatrixSet) -> dict[str, int]:
     """The rows that a table of DOFs names."""
-    from solver.matrices.labels import label
+    from solver.matrices.readers.numbers_in_text import label
 
     rows: dict[str, int] = {}
     for name, row in table.items():

@@ -20,7 +20,7 @@ from solver.errors import Issue, SceneError, SettingError
 
 if TYPE_CHECKING:
     from optim.identification.data.measured import MeasuredRows
-    from optim.identification.unknowns import Unknowns
+    from optim.identification.fit import Unknowns
     from solver.scene.scene import Scene
 
 MOST_TABLES, MOST_NUMBERS = 200, 200_000
@@ -101,8 +101,8 @@ class Measured(Study, HarmonicRequest):
 
     def read_issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the whole description, by the pointer of its field."""
+        from optim.identification.fit import read_unknowns
         from optim.identification.reading import read_data
-        from optim.identification.unknowns import read_unknowns
 
         try:
             known = read_unknowns(scene, self.unknowns, self.scaling, self.priors)

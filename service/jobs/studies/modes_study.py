@@ -139,7 +139,7 @@ class Modes(Study, HarmonicRequest):
 
     EXAMPLES = ({"scene": "two-dof", "mode": 1, "from": 0.01, "to": 100},)
     NAME, FUNCTION, RESULT = "modes", "solver:nonlinear_mode", modes_result
-    TOLD = "solver.views.tables.modes:mode"
+    TOLD = "solver.views.tables.disks:mode"
     SHOWS = "frequency and damping ratio over the amplitude ([modes](modes.md))"
     EMPTY = ("amplitude", "no point of the mode was found")
 
@@ -258,6 +258,6 @@ class Modes(Study, HarmonicRequest):
     @classmethod
     def figure(cls, result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
         """Return frequency and damping ratio over the amplitude, or frequency and force of resonances."""
-        from solver.views.plots.modes import mode_figure, resonance_figure
+        from solver.views.plots.disks import mode_figure, resonance_figure
 
         return mode_figure(result) if result.get("damping_ratio") is not None else resonance_figure(result)

@@ -25,8 +25,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from solver.matrices.labels import Label, component, distinct, node_number
-from solver.matrices.readers.numbers_in_text import LARGEST, FormatError, ascii_lines
+from solver.matrices.readers.numbers_in_text import (
+    LARGEST,
+    FormatError,
+    Label,
+    ascii_lines,
+    component,
+    distinct,
+    node_number,
+)
 from solver.matrices.readers.reader_registry import Reader
 
 _INTEGERS = re.compile(r"\(?\s*(\d*)\s*I\s*(\d+)(?:\.\d+)?\s*\)?")

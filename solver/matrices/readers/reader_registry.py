@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
 from solver.extensions import Kinds
-from solver.matrices.labels import Label
+from solver.matrices.readers.numbers_in_text import Label
 from solver.wording import documented
 
 _SUFFIX = re.compile(r"\.[a-z0-9]{1,12}")
@@ -116,9 +116,9 @@ SHIPPED = (
     "solver.matrices.readers.array_files",
     "solver.matrices.readers.matrix_market",
     "solver.matrices.readers.harwell_boeing",
-    "solver.matrices.readers.abaqus",
+    "solver.matrices.decks.keywords",
     "solver.matrices.readers.output4",
-    "solver.matrices.readers.dmig",
+    "solver.matrices.decks.nastran",
     "solver.matrices.sectors.decks",
 )
 _START = 200

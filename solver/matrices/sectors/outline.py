@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import Integer, Real
-from solver.matrices.sectors.elements import drawn_edges
+from solver.matrices.decks.deck import drawn_edges
 from solver.matrices.values import ByContent
 
 if TYPE_CHECKING:

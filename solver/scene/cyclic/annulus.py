@@ -24,7 +24,7 @@ from solver.scene.cyclic.sector_blocks import (
     full_elimination,
 )
 from solver.scene.linear_terms import Coupling, LinearTerm
-from solver.scene.parameter_paths import find_parameter
+from solver.scene.parameter_paths import NUMBERS, TABLES, find_parameter
 from solver.scene.scene import (
     AnyContact,
     Body,
@@ -43,7 +43,6 @@ from solver.scene.scene import (
     parse_end,
 )
 from solver.scene.scene_records import Recovered
-from solver.scene.structure_parameters import NUMBERS, TABLES
 from solver.wording import listing
 
 

@@ -15,8 +15,7 @@ from solver.results.measures import Measured
 from solver.scene.scene import Scene
 from solver.studies.blades import BladeAmplitudes, BladePeaks
 from solver.views.plots.curves import Response
-from solver.views.plots.disks import blades_figure
-from solver.views.plots.modes import performance_figure
+from solver.views.plots.disks import blades_figure, performance_figure
 from solver.views.plots.motion import Motion, motion_figure, multipliers_figure
 from solver.views.plots.responses import Demands, response_figure
 from solver.views.plots.style import Into

@@ -11,8 +11,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from solver.results.dataset import Dataset
-from solver.results.files import whole
+from solver.results.files import Dataset, whole
 from solver.results.told import Block, Summary
 from solver.views.plots import style
 from solver.views.plots.style import write

@@ -1,8 +1,8 @@
-"""What people read of disks: interference diagrams and mistuned disks, given as JSON."""
+"""What people read of a nonlinear mode and of disks, given as the JSON objects that programs read."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from solver.results import units
@@ -10,6 +10,7 @@ from solver.results.known import known_pairs
 from solver.results.measures import Measured
 from solver.results.order_statistics import quantile_words
 from solver.results.told import Block, ResultTable, Summary
+from solver.views.tables.responses import proved
 
 _DIRECTIONS = {"standing": "", "both": "", "forward": " forward", "backward": " backward"}
 MISSING = "the sector was not reduced for nodal diameters {}: reduce it for all with --engine-order 1"
@@ -90,3 +91,145 @@ def mistuning(found: Mapping[str, Any]) -> Iterator[Block]:
     pairs += known_pairs(found)
     pairs.append(("time", units.duration(found["seconds"])))
     yield Summary(f"{title}, {found['n_harmonics']} harmonics", pairs)
+
+
+_MOST_ROWS = 40
+_LEVEL = 1e-9  # relative difference of damping ratios that is none
+_Column = tuple[str, str, Callable[[Any], str]]  # its head, key, and how a value is told
+_AMPLITUDE: _Column = "a [√kg m]", "amplitude", "{:.4g}".format
+_FREQUENCY: _Column = "frequency [Hz]", "frequency", "{:.6g}".format
+_FACTOR: _Column = "× excitation", "excitation", "{:.4g}".format
+
+
+def held(found: Mapping[str, Any]) -> Iterator[Block]:
+    """Frequency, force, phase and states of the contacts where one amplitude is held."""
+    size = units.length(found["amplitude"])
+    title = f"{found['scene']}, |{found['dof']}| held at {size}, {found['n_harmonics']} harmonics"
+    pairs = [("points", str(len(found["frequency"]))), ("time", units.duration(found["seconds"]))]
+    if found["least"] is not None:
+        best = found["least"]
+        pairs.insert(0, ("least force", f"{best['excitation']:.5g} times, at {best['frequency']:.6g} Hz"))
+    if found["stability_unknown"]:
+        pairs.append(("stability", found["stability_unknown"]))
+    phase = "phase [deg]", "phase", "{:.1f}".format
+    stable = "stable", "stable", {None: "?", True: "yes", False: "no"}.__getitem__
+    yield from _curve(found, title, pairs, [_FREQUENCY, _FACTOR, phase, _height(found), stable])
+
+
+def resonance(found: Mapping[str, Any]) -> Iterator[Block]:
+    """Amplitude, frequency, force and states of the contacts in phase resonance."""
+    pairs = [("points", str(len(found["frequency"]))), ("time", units.duration(found["seconds"]))]
+    title = f"{found['scene']}, phase resonance of mode {found['mode']}"
+    yield from _curve(found, title, pairs, [_AMPLITUDE, _height(found), _FREQUENCY, _FACTOR])
+
+
+def mode(found: Mapping[str, Any]) -> Iterator[Block]:
+    """Amplitude, frequency, damping ratio and states of the contacts, a point a row, thinned to a page."""
+    if found.get("damping_ratio") is None:
+        yield from resonance(found)
+        return
+    of = "" if found["nodal_diameter"] is None else f", nodal diameter {found['nodal_diameter']}"
+    title = f"{found['scene']}, mode {found['mode']}{of}, {found['n_harmonics']} harmonics"
+    count = len(found["amplitude"])
+    pairs = [("points", f"{count}, {found['newton_iterations']} Newton iterations")]
+    if count:
+        # Where damping is level, rounding would choose among its places.
+        ratios = found["damping_ratio"]
+        best = next(i for i, one in enumerate(ratios) if one >= max(ratios) - _LEVEL * abs(max(ratios)))
+        at = f"a = {found['amplitude'][best]:.4g} √kg m, {found['frequency'][best]:.6g} Hz"
+        pairs.insert(0, ("most damping", f"{ratios[best]:.5g} at {at}"))
+    pairs.append(("time", units.duration(found["seconds"])))
+    pairs += proved(found.get("certificates") or ())
+    damping = ("damping ratio", "damping_ratio", "{:.5g}".format), ("± by harmonics", "damping_error", _error)
+    yield from _curve(found, title, pairs, [_AMPLITUDE, _height(found), _FREQUENCY, *damping])
+    if found.get("performance"):
+        yield from _performance(found["performance"], found["dof"])
+    if found.get("limit_cycles"):
+        yield _cycles(found["limit_cycles"], found["dof"])
+
+
+def _height(found: Mapping[str, Any]) -> _Column:
+    return Measured(dof=found["dof"]).name, "max_abs", units.length
+
+
+def _curve(
+    found: Mapping[str, Any], title: str, pairs: list[tuple[str, str]], columns: Sequence[_Column]
+) -> Iterator[Block]:
+    """A point a row, thinned to a page, with the states of the contacts, and what is said of all."""
+    rows = [
+        [*(told(found[key][i]) for _, key, told in columns), _states(found, i)]
+        for i in _thinned(len(found["frequency"]))
+    ]
+    if rows:
+        yield ResultTable(title, [*(head for head, _, _ in columns), "contacts"], rows)
+    yield Summary("" if rows else title, pairs)
+
+
+def _performance(curve: Mapping[str, Any], dof: str) -> Iterator[Block]:
+    """Peaks over the excitation and, where they scale, over the loads."""
+    heads = ["× excitation", f"peak of |{dof}|", "at [Hz]", "× load", f"peak of |{dof}|"]
+    rows = []
+    for i in _thinned(len(curve["excitation"])):
+        row = [
+            f"{curve['excitation'][i]:.4g}",
+            units.length(curve["peak"][i]),
+            f"{curve['frequency'][i]:.6g}",
+        ]
+        known = curve["scales"] and curve["load"][i] is not None
+        row += [f"{curve['load'][i]:.4g}", units.length(curve["peak_at_load"][i])] if known else ["", ""]
+        rows.append(row)
+    yield ResultTable("Peaks of this mode alone", heads, rows)
+    if curve["least"] is not None:
+        best = curve["least"]
+        yield Summary(
+            "", [("least peak", f"{units.length(best['peak'])} with {best['load']:.4g} times the loads")]
+        )
+
+
+def _cycles(found: Mapping[str, Any], dof: str) -> Summary:
+    """Limit cycles, and the most the damper holds."""
+    pairs, named = [], Measured(dof=dof).name
+    if found["most_damping"] is not None:
+        most = f"ζ = {found['most_damping']:.5g} ± {_error(found['most_error'])}"
+        end = ", the end of the curve: more may be held beyond" if found["most_at_end"] else ""
+        pairs.append(("most that is held", f"{most} at a = {found['most_at']:.4g} √kg m{end}"))
+    for cycle in found["cycles"]:
+        name = {True: "stable cycle", False: "unstable cycle", None: "cycle"}[cycle["stable"]]
+        size = f"{named} {units.length(cycle['max_abs'])} ± {_error(cycle['max_abs_error'], units.length)}"
+        at = f"{cycle['frequency']:.6g} ± {_error(cycle['frequency_error'])} Hz"
+        pairs.append((name, f"a = {cycle['amplitude']:.6g} √kg m, {size}, {at}"))
+        if cycle["stable"] is None:
+            mode = "attracts" if cycle["attracts"] else "repels"
+            pairs.append(("", f"the mode alone {mode}; stability not known: {cycle['growth']}"))
+    for low, high in found["unsolved"]:
+        pairs.append(("not solved", f"a = {low:.6g} to {high:.6g} √kg m: a cycle may be there"))
+    if not found["cycles"]:
+        pairs.append(("limit cycles", "none between these amplitudes"))
+    if found.get("load_for") is not None:
+        asked = found["load_for"]
+        pairs.append((f"holds a = {asked['disturbance']:.6g} √kg m", asked["words"]))
+    if not found["completed"]:
+        pairs.append(("not complete", "the curve ends before its largest amplitude: more may be beyond"))
+    on = ", on this mode alone" if found["mode_alone"] else ""
+    return Summary(f"Aerodynamic damping ratio {found['aero_damping']:g}{on}", pairs)
+
+
+def _error(value: float | None, told: Callable[[float], str] = "{:.2g}".format) -> str:
+    """What more harmonics would change."""
+    return "not known" if value is None else told(value)
+
+
+def _states(found: Mapping[str, Any], i: int) -> str:
+    """What the contacts do at a point, in words."""
+    names, states = found["contacts"], found["states"][i]
+    if not states:
+        return "none"
+    same = len(set(states)) == 1
+    return states[0] if same else ", ".join(f"{n}: {s}" for n, s in zip(names, states, strict=True))
+
+
+def _thinned(count: int) -> list[int]:
+    """Some points, the first and the last among them."""
+    if count <= _MOST_ROWS:
+        return list(range(count))
+    return sorted({round(k * (count - 1) / (_MOST_ROWS - 1)) for k in range(_MOST_ROWS)})

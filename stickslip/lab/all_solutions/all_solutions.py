@@ -25,7 +25,7 @@ from solver.response.stability.floquet import stability
 from solver.response.stability.multipliers import Stability, verdict_of
 from stickslip.lab.all_solutions.residual_forces import AmplitudeRange, amplitude_range
 from stickslip.lab.all_solutions.solution_search import SolutionSearch
-from solver.response.stability.uniqueness import Uniqueness, uniqueness
+from solver.response.stability.verdict import Uniqueness, uniqueness
 from solver.results.known import Stable, Verdict
 from solver.results.told import Piece
 from solver.results.watch import shows_progress

@@ -25,7 +25,7 @@ from solver.continuation.walk import Pace
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.response.contact_response import ContactState, contact_responses
-from solver.response.held_contacts import LeftForces, held_sliders
+from solver.response.contact_response import LeftForces, held_sliders
 from solver.response.solution import Solution
 from solver.results.told import Piece
 from solver.sensitivity.gradient import Sensitivities

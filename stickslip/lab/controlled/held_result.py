@@ -40,7 +40,7 @@ class LeastForce(NamedTuple):
 class HeldAmplitude(ModalCurve):
     """Responses of one amplitude over the frequency, at the DOF that the scene observes; n points."""
 
-    VIEWS: ClassVar = Views("solver.views", "modes:held", "modes:held_figure")
+    VIEWS: ClassVar = Views("solver.views", "disks:held", "disks:held_figure")
     DATA: ClassVar = Data(
         "controlled", {"point": "frequency=frequency_hz excitation excitation_error phase=phase_deg"
          " max_abs stable=stable_words", **OF_CONTACTS, "point harmonic": "observed"},

@@ -36,10 +36,10 @@ class Controlled(Study, HarmonicRequest):
         changes=list[Table],
         least=Table | None,
     )
-    TOLD = "solver.views.tables.modes:held"
+    TOLD = "solver.views.tables.disks:held"
     SHOWS = "force and phase over the frequency ([a held amplitude](modes.md#a-held-amplitude))"
     EMPTY = ("frequency", "no response with this amplitude was found")
-    FIGURE = "solver.views.plots.modes:held_figure"
+    FIGURE = "solver.views.plots.disks:held_figure"
 
     amplitude: Annotated[PositiveNumber, Flag(metavar="A")] = Field(
         description="Amplitude of harmonic 1 that is held [m]."

@@ -19,7 +19,7 @@ from stickslip.lab.posterior.posterior_result import Marginal, Posterior, Poster
 from stickslip.lab.posterior.sampling import SAMPLING, Sampling
 from stickslip.lab.posterior.target import Target
 from optim.identification.reading import Given, read_data
-from optim.identification.unknowns import read_unknowns
+from optim.identification.fit import read_unknowns
 from optim.problem.variables import Real
 from solver.balance.balance import resolve
 from solver.jit.timer import clock

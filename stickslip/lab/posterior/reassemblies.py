@@ -28,7 +28,7 @@ from stickslip.lab.posterior.posterior import posterior
 from stickslip.lab.posterior.posterior_result import Marginal, Posterior
 from stickslip.lab.posterior.sampling import SAMPLING, Sampling
 from optim.identification.reading import Given
-from optim.identification.unknowns import Unknowns, read_unknowns
+from optim.identification.fit import Unknowns, read_unknowns
 from optim.problem.variables import Real
 from solver.arrays import FloatOrNaN
 from solver.balance.balance import resolve

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.special import gammaln, ndtr, ndtri
 
 from optim.identification.fit import LocalFit, Runs
-from optim.identification.unknowns import Unknowns
+from optim.identification.fit import Unknowns
 from optim.problem.variables import Real
 
 _LOG_2_PI = math.log(2.0 * math.pi)

@@ -1,7 +1,7 @@
 """The worst mistuning together with the worst forces that stuck contacts of a disk may hold.
 
 A contact that sticks all the time keeps a force s, whatever brought it there, as long as |kt u + s| ≤ μN at
-every instant (`solver.response.held_contacts`). Where contacts stick at a peak, what is possible
+every instant (`solver.response.contact_response`). Where contacts stick at a peak, what is possible
 is therefore the largest max|x| over the factors of the blades, the frequency and these forces together:
 
     maximise max|x_b|(δ, s, f)   subject to   min over τ of μN − ±(kt u + s) ≥ 0,  δ and f within bounds,
@@ -28,7 +28,7 @@ from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.jit import fourier
 from solver.response.contact_response import ContactState, contact_responses
-from solver.response.held_contacts import LeftForces
+from solver.response.contact_response import LeftForces
 from solver.response.wear import lowest
 from solver.scene.scene import AnyContact, Scene
 from solver.sensitivity.gradient import Sensitivities

@@ -21,10 +21,9 @@ from scipy.sparse import coo_array
 import solver
 from service.cli import main
 from solver.linear.assembly import linear_model
-from solver.matrices.decks.deck import Deck
+from solver.matrices.decks.deck import Deck, shape_of
 from solver.matrices.mortar import MortarPair, mortar
 from solver.matrices.sectors.decks import read_deck
-from solver.matrices.sectors.elements import shape_of
 from solver.scene.cyclic.annulus import annulus
 
 ROOT = Path(__file__).resolve().parent.parent.parent.parent

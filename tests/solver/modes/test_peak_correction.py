@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import solver
-from solver.modes.peaks.peak_correction import corrected_peak
-from solver.modes.peaks.peak_gradient import peak_at_excitation
+from solver.modes.peaks.peak_correction import corrected_peak, peak_at_excitation
 from solver.modes.peaks.performance import performance_over
 from tests.cases.random_scenes import random_scene
 

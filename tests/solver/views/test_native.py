@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 import optim
 import solver
 from solver.results.base import Shown
-from solver.results.dataset import Dataset, Variable
+from solver.results.files import Dataset, Variable
 from solver.results.told import Piece, Told
 from solver.views.io import SUFFIXES
 

@@ -15,7 +15,7 @@ from stickslip.lab.posterior.nuts import nuts
 from stickslip.lab.posterior.reassemblies import Level
 from stickslip.lab.posterior.target import Target
 from optim.identification.reading import read_data
-from optim.identification.unknowns import read_unknowns
+from optim.identification.fit import read_unknowns
 from optim.problem.uncertainty_input import read_uncertain
 from optim.problem.uncertainty_set import UncertaintyShape
 

@@ -11,7 +11,7 @@ import solver
 from solver import ResidualPeak, Scene, SettingError, WorstSearch, mistuned, worst_mistuning
 from solver.jit import fourier
 from solver.marching.march_start import MarchStart
-from solver.response.held_contacts import LeftForces
+from solver.response.contact_response import LeftForces
 from solver.studies.instant import start_of
 from stickslip.lab.worst_mistuning.climbing import Bounds
 from stickslip.lab.worst_mistuning.residual_peaks import ResidualSearch, _Place
