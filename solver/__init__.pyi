@@ -29,7 +29,7 @@ from .errors import (
     StoppedError as StoppedError,
 )
 from .marching.march import march as march
-from .marching.march_start import MarchStart as MarchStart
+from .marching.march import MarchStart as MarchStart
 from .marching.transient import transient as transient
 from stickslip.lab.proofs.certified_cycles import certify_cycle as certify_cycle
 from stickslip.lab.controlled.controlled import held_amplitude as held_amplitude

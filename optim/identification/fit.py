@@ -321,7 +321,13 @@ def _search(runs: Runs, z: Real, sd: Real, robust: bool) -> LocalFit:
         return np.concatenate([rows, runs.unknowns.prior_rows(x)[1]])
 
     def loss(squares: Real) -> Real:
-        return np.stack(_huber(squares, n_data if robust else 0))
+        # Of Huber's loss two derivatives; the priors count plainly.
+        value, slope, bend = squares.copy(), np.ones_like(squares), np.zeros_like(squares)
+        far = np.flatnonzero(squares[: n_data if robust else 0] > HUBER**2)
+        size = np.sqrt(squares[far])
+        value[far] = 2.0 * HUBER * size - HUBER**2
+        slope[far], bend[far] = HUBER / size, -0.5 * HUBER / size**3
+        return np.stack((value, slope, bend))
 
     found = least_squares(
         residuals, start, jac=jacobian, bounds=(0.0, 1.0), method="trf", loss=loss if robust else "linear",
@@ -331,16 +337,6 @@ def _search(runs: Runs, z: Real, sd: Real, robust: bool) -> LocalFit:
         fitted=runs.at(np.asarray(found.x)), sd=sd, level=1.0, active=active, cost=float(found.cost),
         converged=bool(found.status > 0),
     )  # fmt: skip
-
-
-def _huber(squares: Real, count: int) -> tuple[Real, Real, Real]:
-    """Return Huber's loss of squared residuals with two derivatives, from place `count` on the plain one."""
-    value, slope, bend = squares.copy(), np.ones_like(squares), np.zeros_like(squares)
-    far = np.flatnonzero(squares[:count] > HUBER**2)
-    size = np.sqrt(squares[far])
-    value[far] = 2.0 * HUBER * size - HUBER**2
-    slope[far], bend[far] = HUBER / size, -0.5 * HUBER / size**3
-    return value, slope, bend
 
 
 STARTS, MOST_STARTS = 16, 1000
@@ -374,7 +370,12 @@ def search(
     """Fit all runs from the best of many starts."""
     coarse = runs.thinned(_POINTS)
     ranked: list[tuple[float, Real]] = []
-    places = _places(runs, starts, seed)
+    # The scene's own values, the middle, and places of a Sobol sequence.
+    n = len(runs.unknowns)
+    middle = np.full(n, 0.5)
+    rest = max(starts - 2, 0)
+    sobol = quasi_random(n, max(rest, 1), seed)[:rest]
+    places = [runs.unknowns.start(runs.scene), middle, *sobol][:starts]
     for i, z in enumerate(places):
         if should_stop is not None and should_stop():
             return Searched(best=None, others=(), starts=i, agreeing=0)
@@ -400,22 +401,17 @@ def search(
     others = tuple((one.fitted.z, r) for one, far, r in zip(fits, away, ratio, strict=True) if far)
     best = fit(runs, first.z, noise)
     if any(not model.unique for model in runs.models):
-        best = _on_its_branches(runs, best, noise)
+        # Again with the solutions nearest to the data at the optimum, while that makes it better.
+        for _ in range(3):
+            runs.forget()
+            again = fit(runs, best.fitted.z, noise)
+            settled = np.allclose(again.fitted.z, best.fitted.z, atol=1e-4)
+            best = again
+            if settled:
+                break
     if on_progress is not None:
         on_progress(1.0, runs.evaluations)
     return Searched(best=best, others=others, starts=len(places), agreeing=len(fits) - len(others))
-
-
-def _on_its_branches(runs: Runs, best: LocalFit, noise: Noise) -> LocalFit:
-    """Fit again with the solutions nearest to the data at the optimum, while that makes it better."""
-    for _ in range(3):
-        runs.forget()
-        again = fit(runs, best.fitted.z, noise)
-        settled = np.allclose(again.fitted.z, best.fitted.z, atol=1e-4)
-        best = again
-        if settled:
-            break
-    return best
 
 
 def misfit(runs: Runs, found: Fitted) -> float:
@@ -425,12 +421,3 @@ def misfit(runs: Runs, found: Fitted) -> float:
     rest = ((found.values - runs.observations) / (_COARSE * shape))[reached]
     prior, _ = runs.unknowns.prior_rows(found.z)
     return float(np.sum(np.log1p(rest**2)) * reached.size / max(int(reached.sum()), 1) + np.sum(prior**2))
-
-
-def _places(runs: Runs, starts: int, seed: int) -> list[Real]:
-    """Return the scene's own values, the middle, and places of a Sobol sequence."""
-    n = len(runs.unknowns)
-    middle = np.full(n, 0.5)
-    rest = max(starts - 2, 0)
-    sobol = quasi_random(n, max(rest, 1), seed)[:rest]
-    return [runs.unknowns.start(runs.scene), middle, *sobol][:starts]

@@ -126,7 +126,11 @@ def untold(
     ----------
     states : of each run, contact to the codes it had at its points.
     """
-    seen = _states_of(states)
+    # The state codes every contact ever had, not reached ones left out.
+    seen: dict[str, set[int]] = {}
+    for run in states:
+        for name, codes in run.items():
+            seen.setdefault(name, set()).update(int(code) for code in np.unique(codes) if code >= 0)
     return tuple(_one(scene, unknowns, z, direction, seen) for _, direction in known.weak())
 
 
@@ -141,15 +145,6 @@ def strong_correlations(unknowns: Unknowns, known: Information) -> tuple[tuple[s
             if abs(share) > _CORRELATED:
                 found.append((unknowns.names[i], unknowns.names[j], share))
     return tuple(found)
-
-
-def _states_of(states: Sequence[Mapping[str, Integer]]) -> dict[str, set[int]]:
-    """Return the state codes every contact ever had, not reached ones left out."""
-    seen: dict[str, set[int]] = {}
-    for run in states:
-        for name, codes in run.items():
-            seen.setdefault(name, set()).update(int(code) for code in np.unique(codes) if code >= 0)
-    return seen
 
 
 def _one(

@@ -181,7 +181,17 @@ def _table_of(given: Mapping[str, Any], index: int, paths: frozenset[str]) -> Ta
 def _runs(scene: Scene, table: Table, paths: frozenset[str], unknown: frozenset[str]) -> list[MeasuredRows]:
     """Read a table as runs of equal conditions."""
     check_numbers(table)
-    table = _conditions_in_si(scene, table)
+    # Columns of parameters in the units of the scene.
+    columns = dict(table.columns)
+    for path, text in table.path_units.items():
+        found = find_parameter(scene, path)
+        own = found.unit if found is not None else ""
+        forces = (unit_of(Dimension.FORCE, own or "-"), unit_of(Dimension.FORCE, text))
+        if None not in forces:
+            columns[path] = columns[path] * (forces[1].factor if forces[1] else 1.0)
+        elif _plain_unit(text) != _plain_unit(own):
+            raise table.refusal(text, f"must be in {own or '1'}", path)
+    table = replace(table, columns=columns)
     varied = [name for name in table.columns if name in paths]
     for path in (*varied, *table.conditions):
         if path in unknown:
@@ -195,20 +205,6 @@ def _runs(scene: Scene, table: Table, paths: frozenset[str], unknown: frozenset[
             raise run.refusal(error.value, f"condition: {error}") from error
         runs.append(kind.read(scene, run))
     return runs
-
-
-def _conditions_in_si(scene: Scene, table: Table) -> Table:
-    """Return a table whose columns of parameters are in the units of the scene."""
-    columns = dict(table.columns)
-    for path, text in table.path_units.items():
-        found = find_parameter(scene, path)
-        own = found.unit if found is not None else ""
-        forces = (unit_of(Dimension.FORCE, own or "-"), unit_of(Dimension.FORCE, text))
-        if None not in forces:
-            columns[path] = columns[path] * (forces[1].factor if forces[1] else 1.0)
-        elif _plain_unit(text) != _plain_unit(own):
-            raise table.refusal(text, f"must be in {own or '1'}", path)
-    return replace(table, columns=columns)
 
 
 def _plain_unit(text: str) -> str:

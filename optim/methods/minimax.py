@@ -256,8 +256,28 @@ def _curvature(
     """
     exact = _exact(fresh if accepted else model, pulls)
     if exact is not None:
-        return _convex(exact)
-    return _update(hessian, fresh.z - model.z, _gradient(fresh, pulls) - _gradient(model, pulls))
+        # The nearest positive semidefinite matrix.
+        values, vectors = np.linalg.eigh(exact)
+        convex: Real = (vectors * np.maximum(values, 0.0)) @ vectors.T
+        return convex
+    # The damped BFGS update; the first one scales the matrix.
+    s = fresh.z - model.z
+    y = _gradient(fresh, pulls) - _gradient(model, pulls)
+    curvature = float(s @ y)
+    if not np.any(hessian):
+        if curvature <= 0.0 or not np.any(s):
+            return hessian
+        return np.eye(s.size) * curvature / float(s @ s)
+    Bs = hessian @ s
+    quadratic = float(s @ Bs)
+    if quadratic <= 0.0:
+        return hessian
+    if curvature < 0.2 * quadratic:
+        theta = 0.8 * quadratic / (quadratic - curvature)
+        y = theta * y + (1.0 - theta) * Bs
+        curvature = float(s @ y)
+    updated: Real = hessian - np.outer(Bs, Bs) / quadratic + np.outer(y, y) / curvature
+    return updated
 
 
 def _exact(model: Model, pulls: list[tuple[CriterionRow, float]]) -> Real | None:
@@ -271,13 +291,6 @@ def _exact(model: Model, pulls: list[tuple[CriterionRow, float]]) -> Real | None
             return None
         total += multiplier * second
     return total
-
-
-def _convex(hessian: Real) -> Real:
-    """Return the nearest positive semidefinite matrix."""
-    values, vectors = np.linalg.eigh(hessian)
-    convex: Real = (vectors * np.maximum(values, 0.0)) @ vectors.T
-    return convex
 
 
 def _gradient(model: Model, pulls: list[tuple[CriterionRow, float]]) -> Real:
@@ -295,25 +308,6 @@ def _pulls(model: Model, step: Step) -> list[tuple[CriterionRow, float]]:
     found = [(row, float(x)) for row, x in zip(model.rows, step.multipliers, strict=True) if x > NOTHING]
     limits = zip(model.limited, step.limit_multipliers, strict=True)
     return found + [(replace(row, weight=0.0), float(x)) for row, x in limits if x > NOTHING]
-
-
-def _update(hessian: Real, s: Real, y: Real) -> Real:
-    """Return the damped BFGS update; the first one scales the matrix."""
-    curvature = float(s @ y)
-    if not np.any(hessian):
-        if curvature <= 0.0 or not np.any(s):
-            return hessian
-        return np.eye(s.size) * curvature / float(s @ s)
-    Bs = hessian @ s
-    quadratic = float(s @ Bs)
-    if quadratic <= 0.0:
-        return hessian
-    if curvature < 0.2 * quadratic:
-        theta = 0.8 * quadratic / (quadratic - curvature)
-        y = theta * y + (1.0 - theta) * Bs
-        curvature = float(s @ y)
-    updated: Real = hessian - np.outer(Bs, Bs) / quadratic + np.outer(y, y) / curvature
-    return updated
 
 
 def _root(hessian: Real) -> Real:

@@ -327,28 +327,25 @@ def _level(result: DesignResult, should_stop: ShouldStop, tick: Tick) -> DesignR
         if plateau is None:
             return result
         if plateau.better is None:
-            return _at(result, plateau)
+            evaluation = plateau.evaluation
+            status: DesignStatus = result.status
+            model = model_of(
+                evaluation, result.problem.variables, evaluation.objective, result.problem.scales
+            )
+            found = conditions(model, result.problem.variables, feasibility=model.violation > KEPT)
+            if status in (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK):
+                settled = found.residual <= KKT_TOLERANCE
+                status = settled_status(found) if settled else status
+            history = result.history if evaluation is result.evaluation else (*result.history, evaluation)
+            if evaluation is not result.evaluation and len(result.history) == 1:
+                history = (evaluation,)
+            return replace(
+                result, status=status, evaluation=evaluation, conditions=found, history=history,
+                basins=_merged(result, plateau), plateau=plateau.intervals, chosen_by=plateau.chosen_by,
+                evaluations=result.evaluations + plateau.responses, work=result.work + plateau.responses,
+            )  # fmt: skip
         result = _improved(result, plateau.better, should_stop, tick)
     return result
-
-
-def _at(result: DesignResult, plateau: DesignPlateau) -> DesignResult:
-    """Return a result at the design chosen of its plateau."""
-    evaluation = plateau.evaluation
-    status = result.status
-    model = model_of(evaluation, result.problem.variables, evaluation.objective, result.problem.scales)
-    found = conditions(model, result.problem.variables, feasibility=model.violation > KEPT)
-    if status in (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK):
-        settled = found.residual <= KKT_TOLERANCE
-        status = settled_status(found) if settled else status
-    history = result.history if evaluation is result.evaluation else (*result.history, evaluation)
-    if evaluation is not result.evaluation and len(result.history) == 1:
-        history = (evaluation,)
-    return replace(
-        result, status=status, evaluation=evaluation, conditions=found, history=history,
-        basins=_merged(result, plateau), plateau=plateau.intervals, chosen_by=plateau.chosen_by,
-        evaluations=result.evaluations + plateau.responses, work=result.work + plateau.responses,
-    )  # fmt: skip
 
 
 def _improved(

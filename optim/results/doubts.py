@@ -36,21 +36,22 @@ def doubts_of(
     """
     if evaluation is None:
         return ()
+    rows = (row for row in evaluation.rows if math.isinf(row.told))
+    found = {f"{row.what.partition(' at ')[0]} is infinite: {row.quantity.endless}" for row in rows}
+    endless = sorted(found)
+    # Of the responses and the rows, each once.
+    own = (flag for one in evaluation.responses for flag in one.branch.flags)
+    at_peaks = (flag for _, known in evaluation.known_parts for flag in known.flags)
+    of_rows = (flag for row in evaluation.rows for flag in row.flags)
+    flags = flag_words(dict.fromkeys((*own, *at_peaks, *of_rows)))
     return (
-        *_endless(evaluation),
+        *endless,
         *_few_harmonics(evaluation, harmonics),
         *_checked(checked, optimum, feasible=feasible),
         *open_peaks(evaluation),
-        *_flags(evaluation),
+        *flags,
         *(note.words for note in notes_of_all(known.notes for _, known in evaluation.known_parts)),
     )
-
-
-def _endless(evaluation: DesignEvaluation) -> list[str]:
-    """What there is no end to, and why."""
-    rows = (row for row in evaluation.rows if math.isinf(row.told))
-    found = {f"{row.what.partition(' at ')[0]} is infinite: {row.quantity.endless}" for row in rows}
-    return sorted(found)
 
 
 def open_peaks(evaluation: DesignEvaluation) -> list[str]:
@@ -89,14 +90,6 @@ def _checked(checked: Sequence[Checked], optimum: Mapping[str, float], *, feasib
         where = ", ".join(f"{name} = {value:.6g}" for name, value in best.values.items())
         found.append(f"with {best.harmonics} harmonics another local optimum is better: {where}")
     return found
-
-
-def _flags(evaluation: DesignEvaluation) -> list[str]:
-    """The flags of the responses and the rows, each once."""
-    own = (flag for one in evaluation.responses for flag in one.branch.flags)
-    at_peaks = (flag for _, known in evaluation.known_parts for flag in known.flags)
-    of_rows = (flag for row in evaluation.rows for flag in row.flags)
-    return flag_words(dict.fromkeys((*own, *at_peaks, *of_rows)))
 
 
 def doubt_of(known_parts: Iterable[tuple[str, Known]], weights: Mapping[str, float]) -> float:

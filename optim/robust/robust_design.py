@@ -203,7 +203,16 @@ def _run(
             search.problem, state.unknown = earlier, again.unknown
             break
         state = again
-    return _result(search, state, status)
+    best = state.progress.best
+    return RobustResult(
+        problem=search.problem, uncertain=search.uncertain, aim=search.aim, quantile=search.quantile,
+        status=status, design=state.nominal, nominal=state.sides.get("nominal"),
+        robust=state.sides.get("robust"),
+        objective=math.nan if best is None else search.objective(best, len(state.progress.scenarios)),
+        conditions=None if best is None else best.conditions, cuts=state.progress.weighed(),
+        gap=state.progress.gap, inner_look=state.progress.finished, unknown=state.unknown,
+        designs=search.designs, responses=search.responses, seconds=0.0,
+    )  # fmt: skip
 
 
 def _ended(search: RobustSearch, drawn: tuple[Scenario, ...], state: _State) -> RobustStatus:
@@ -253,17 +262,3 @@ def _checked_status(search: RobustSearch, state: _State, status: RobustStatus) -
         state.progress.gap = max(state.progress.gap, excess)
         return RobustStatus.NOT_CLOSED if status is RobustStatus.OPTIMAL else status
     return status
-
-
-def _result(search: RobustSearch, state: _State, status: RobustStatus) -> RobustResult:
-    """Put the result together."""
-    best = state.progress.best
-    return RobustResult(
-        problem=search.problem, uncertain=search.uncertain, aim=search.aim, quantile=search.quantile,
-        status=status, design=state.nominal, nominal=state.sides.get("nominal"),
-        robust=state.sides.get("robust"),
-        objective=math.nan if best is None else search.objective(best, len(state.progress.scenarios)),
-        conditions=None if best is None else best.conditions, cuts=state.progress.weighed(),
-        gap=state.progress.gap, inner_look=state.progress.finished, unknown=state.unknown,
-        designs=search.designs, responses=search.responses, seconds=0.0,
-    )  # fmt: skip

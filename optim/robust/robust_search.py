@@ -340,19 +340,17 @@ def _worse(
             finding = search.look(values, aspect, progress.scenarios, samples)
         progress.finished = progress.finished and finding.finished
         worse = [o for o in finding.outcomes if _excess(aspect, aspect.worst(o.rows), master) > CLOSED]
-        found.append((_distinct(worse), _excess(aspect, finding.value, master)))
+        # The worst scenarios that differ: a climb ends in a cloud of them.
+        kept: list[Outcome] = []
+        for one in worse:
+            there = one.scenario
+            same = [
+                other.scenario for other in kept if there.xi and other.scenario.given_disk == there.given_disk
+            ]
+            if len(kept) < AT_ONCE and all(math.dist(other.xi, there.xi) >= CLOUD for other in same):
+                kept.append(one)
+        found.append((kept, _excess(aspect, finding.value, master)))
     return found
-
-
-def _distinct(worse: Sequence[Outcome]) -> list[Outcome]:
-    """Return the worst scenarios that differ: a climb ends in a cloud of them."""
-    kept: list[Outcome] = []
-    for found in worse:
-        here = found.scenario
-        same = [other.scenario for other in kept if here.xi and other.scenario.given_disk == here.given_disk]
-        if len(kept) < AT_ONCE and all(math.dist(other.xi, here.xi) >= CLOUD for other in same):
-            kept.append(found)
-    return kept
 
 
 def _excess(aspect: Aspect, worst: float, master: float) -> float:
@@ -403,18 +401,6 @@ def _starts(
     return [evaluation for evaluation in seen if evaluation.good]
 
 
-def _valleys(search: RobustSearch, seen: Sequence[DesignEvaluation], count: int) -> list[DesignEvaluation]:
-    """Return the designs to search from, best first; with one variable only the lowest of each valley."""
-    merits = {id(evaluation): search.model(evaluation, count).merit for evaluation in seen}
-    kept = list(seen)
-    if len(search.variables) == 1:
-        # From the sides of a valley the same optimum would be found again.
-        kept.sort(key=lambda evaluation: evaluation.values[search.variables[0].name])
-        line = [math.inf, *(merits[id(e)] for e in kept), math.inf]
-        kept = [e for i, e in enumerate(kept) if line[i] >= line[i + 1] <= line[i + 2]]
-    return sorted(kept, key=lambda evaluation: merits[id(evaluation)])
-
-
 def _locals(
     search: RobustSearch, starts: Sequence[DesignEvaluation], scenarios: Sequence[Scenario]
 ) -> tuple[list[Local], RobustStatus | None]:
@@ -425,7 +411,15 @@ def _locals(
         return [], RobustStatus.FLAT
     places: list[list[float]] = []
     found: list[Local] = []
-    for begin in _valleys(search, starts, len(scenarios)):
+    # With one variable only the lowest of each valley.
+    merits = {id(evaluation): search.model(evaluation, len(scenarios)).merit for evaluation in starts}
+    kept = list(starts)
+    if len(search.variables) == 1:
+        # From the sides of a valley the same optimum would be found again.
+        kept.sort(key=lambda evaluation: evaluation.values[search.variables[0].name])
+        line = [math.inf, *(merits[id(e)] for e in kept), math.inf]
+        kept = [e for i, e in enumerate(kept) if line[i] >= line[i + 1] <= line[i + 2]]
+    for begin in sorted(kept, key=lambda evaluation: merits[id(evaluation)]):
         z = [variable.inside(begin.values[variable.name]) for variable in search.variables]
         if len(places) < search.problem.basins and all(math.dist(z, other) > FAR_APART for other in places):
             places.append(z)

@@ -130,7 +130,28 @@ class _Chain:
         """Return the rows of the case with their gradients by path, and the responses computed."""
         problem, values = self._posed(), self._values()
         if self._of_every_blade(problem):
-            return _of_all_blades(problem, problem.cases[0], values, gradients, should_stop)
+            # Of a mistuned disk those of the observed DOF in every sector, from one response.
+            case = problem.cases[0]
+            here = case.scene.with_values(values)
+            effects = effects_of(problem, here)
+            blade = here.observe.dof.partition("@")[0]
+            blades = [f"{blade}@{j}" for j in range(len(blade_rows(here, blade)))]
+            ranges = ranges_of(problem, case)
+            rows: list[CriterionRow] = []
+            for over in ranges:
+                start, stop = over.hertz or (None, None)
+                branch = sweep(
+                    here, start=start, stop=stop, harmonics=problem.harmonics, limit=problem.limit,
+                    settings=ContinuationSettings(errors=False), effects=effects, should_stop=should_stop,
+                )  # fmt: skip
+                if not branch.reached:
+                    return [], len(ranges)
+                for j, dof in enumerate(blades):
+                    seen = branch if j == 0 else observing(branch, dof, limit=problem.limit, errors=False)
+                    named = replace(case, name=f"{case.name}, {dof}")
+                    found = rows_of(problem, named, seen, over, gradients=gradients)
+                    rows += [row for row in found if j == 0 or row.quantity.each_blade]
+            return rows, len(ranges)
         evaluation = evaluate(
             problem, values, gradients=gradients, errors=False, should_stop=should_stop
         )  # fmt: skip
@@ -150,7 +171,14 @@ class _Chain:
 
     def _posed(self) -> Problem:
         """Return the problem of the case in the scenario, every path a variable."""
-        return replace(self._problem, variables=_single(self._values()), cases=(self._case,))
+        return replace(
+            self._problem,
+            variables=tuple(
+                BoundedVariable(name=path, paths=(path,), low=-np.inf, high=np.inf, logarithmic=False)
+                for path in self._values()
+            ),
+            cases=(self._case,),
+        )
 
     def _of_every_blade(self, problem: Problem) -> bool:
         """Return whether all blades of a mistuned disk count."""
@@ -197,40 +225,6 @@ class _Chain:
 
 def _by_members(members: Real, second: Callable[[], Real]) -> Real:
     return np.asarray(members @ second() @ members.T)
-
-
-def _single(values: Mapping[str, float]) -> tuple[BoundedVariable, ...]:
-    """Return a variable for every path, for their gradients."""
-    return tuple(
-        BoundedVariable(name=path, paths=(path,), low=-np.inf, high=np.inf, logarithmic=False)
-        for path in values
-    )
-
-
-def _of_all_blades(
-    problem: Problem, case: LoadCase, values: Mapping[str, float], gradients: bool, should_stop: ShouldStop
-) -> tuple[list[CriterionRow], int]:
-    """Return the rows of a mistuned disk: those of the observed DOF in every sector, from one response."""
-    here = case.scene.with_values(values)
-    effects = effects_of(problem, here)
-    blade = here.observe.dof.partition("@")[0]
-    blades = [f"{blade}@{j}" for j in range(len(blade_rows(here, blade)))]
-    ranges = ranges_of(problem, case)
-    rows: list[CriterionRow] = []
-    for over in ranges:
-        start, stop = over.hertz or (None, None)
-        branch = sweep(
-            here, start=start, stop=stop, harmonics=problem.harmonics, limit=problem.limit,
-            settings=ContinuationSettings(errors=False), effects=effects, should_stop=should_stop,
-        )  # fmt: skip
-        if not branch.reached:
-            return [], len(ranges)
-        for j, dof in enumerate(blades):
-            seen = branch if j == 0 else observing(branch, dof, limit=problem.limit, errors=False)
-            named = replace(case, name=f"{case.name}, {dof}")
-            found = rows_of(problem, named, seen, over, gradients=gradients)
-            rows += [row for row in found if j == 0 or row.quantity.each_blade]
-    return rows, len(ranges)
 
 
 def together(values: Mapping[str, float], outcomes: Sequence[Outcome]) -> DesignEvaluation:

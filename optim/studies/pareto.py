@@ -21,7 +21,7 @@ from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.peak_criterion import BAND, PEAK
 from optim.methods.enough_harmonics import only_if_known
 from optim.methods.evaluator import DesignSearch, SearchStoppedError
-from optim.methods.linearised import ACTIVE, Local, Model, bounds_held
+from optim.methods.linearised import ACTIVE, Model, bounds_held
 from optim.problem.checks import DesignError, whole
 from optim.problem.design_problem import Limit, Method, Problem, pose
 from optim.problem.problem_keys import FEWEST_POINTS, POINTS, FrontKeys, keywords
@@ -139,7 +139,12 @@ class _Front:
             if end.band_hz == 0.0 and len(self.found) == 1:
                 return ParetoStatus.NO_TRADE_OFF
         least, narrowest = self.found
-        self.found[0] = replace(least, slope=self._first_slope(least))
+        # The front leaves the least peak with the slope 0, or steeper where peaks are equal.
+        search = DesignSearch(self.problem)
+        evaluation = _at_limit(least.design.evaluation, least.band_hz)  # type: ignore[arg-type]
+        search.keep(evaluation)
+        slope = -steepest(search.model(evaluation), self.problem.variables) * least.peak / least.band_hz
+        self.found[0] = replace(least, slope=slope)
         if least.band_hz - narrowest.band_hz <= NOTHING_TO_TRADE * least.band_hz:
             return ParetoStatus.NO_TRADE_OFF
         try:
@@ -148,13 +153,6 @@ class _Front:
         except SearchStoppedError:
             return ParetoStatus.STOPPED
         return ParetoStatus.PARTIAL if self.missed else ParetoStatus.COMPLETE
-
-    def _first_slope(self, least: ParetoPoint) -> float:
-        """Return the slope of the front as it leaves the least peak: 0, or steeper where peaks are equal."""
-        search = DesignSearch(self.problem)
-        evaluation = _at_limit(least.design.evaluation, least.band_hz)  # type: ignore[arg-type]
-        search.keep(evaluation)
-        return -steepest(search.model(evaluation), self.problem.variables) * least.peak / least.band_hz
 
     def _report(self, share: float, count: int) -> None:
         if self._on_progress is not None:
@@ -203,7 +201,20 @@ class _Front:
         rebound = [_at_limit(evaluation, width) for evaluation in self._pool]
         search.keep(_at_limit(self.ends[0].evaluation or rebound[0], width))
         try:
-            local = self._searched(search, one, other, width, rebound)
+            # The best end of the local searches from the promising starts.
+            share = (one.band_hz - width) / (one.band_hz - other.band_hz)
+            z = [scaled(search.variables, point.values) for point in (one, other)]
+            middle = search(unscaled(search.variables, z[0] + share * (z[1] - z[0])))
+            starts = sorted([*rebound, *([middle] if middle.good else [])], key=search.merit)
+            begin = [starts[0]]
+            for evaluation in starts[1:]:
+                place = scaled(search.variables, evaluation.values)
+                apart = math.dist(place, scaled(search.variables, begin[0].values))
+                if len(begin) < 2 and FAR_APART < apart <= math.dist(*z) + FAR_APART:
+                    begin.append(evaluation)
+            local_search = local_search_of(search.problem.method)
+            ends = [local_search(search, search.variables, evaluation, search.model) for evaluation in begin]
+            local = min(ends, key=lambda local: local.rank)
         finally:
             self._keep(search.history[1:])
         if not local.feasible:
@@ -220,29 +231,6 @@ class _Front:
         pull = sum(x for row, x in local.conditions.rows if row.quantity is BAND)
         slope = -pull * search.model(local.evaluation).unit / width if local.settled else math.nan
         self.found.append(ParetoPoint.of(only_if_known(result), slope))
-
-    def _searched(
-        self,
-        search: DesignSearch,
-        one: ParetoPoint,
-        other: ParetoPoint,
-        width: float,
-        pool: list[DesignEvaluation],
-    ) -> Local:
-        """Return the best end of the local searches from the promising starts."""
-        share = (one.band_hz - width) / (one.band_hz - other.band_hz)
-        z = [scaled(search.variables, point.values) for point in (one, other)]
-        middle = search(unscaled(search.variables, z[0] + share * (z[1] - z[0])))
-        starts = sorted([*pool, *([middle] if middle.good else [])], key=search.merit)
-        begin = [starts[0]]
-        for evaluation in starts[1:]:
-            place = scaled(search.variables, evaluation.values)
-            apart = math.dist(place, scaled(search.variables, begin[0].values))
-            if len(begin) < 2 and FAR_APART < apart <= math.dist(*z) + FAR_APART:
-                begin.append(evaluation)
-        local_search = local_search_of(search.problem.method)
-        ends = [local_search(search, search.variables, evaluation, search.model) for evaluation in begin]
-        return min(ends, key=lambda local: local.rank)
 
 
 def _at_limit(evaluation: DesignEvaluation, width: float) -> DesignEvaluation:

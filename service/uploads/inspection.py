@@ -235,7 +235,7 @@ def _nodes_of(file: Path) -> int:
     """How many nodes a deck has."""
     from solver.matrices.readers.numbers_in_text import FormatError
     from solver.matrices.readers.reader_registry import MatrixFileError
-    from solver.matrices.sectors.decks import check_alone, read_deck
+    from solver.matrices.sectors.loading import check_alone, read_deck
 
     try:
         check_alone(file)
@@ -248,7 +248,7 @@ def _resolve(scene: dict[str, Any]) -> dict[str, Any]:
     from solver.errors import SceneError
     from solver.matrices.readers.numbers_in_text import FormatError
     from solver.matrices.scene_files import with_files
-    from solver.matrices.sectors.decks import check_alone
+    from solver.matrices.sectors.loading import check_alone
     from solver.matrices.values import as_json
 
     for place in (("structure", "cyclic"), ("structure",)):

@@ -306,7 +306,7 @@ def deck_of(structure: Mapping[str, Any]) -> list[dict[str, Any]] | None:
     SceneError if it cannot be read, or includes other files.
     """
     from solver.matrices.readers.numbers_in_text import FormatError
-    from solver.matrices.sectors.decks import check_alone, read_deck
+    from solver.matrices.sectors.loading import check_alone, read_deck
 
     cyclic = structure.get("cyclic")
     name = cyclic.get("nodes") if isinstance(cyclic, Mapping) else None

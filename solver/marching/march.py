@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from numbers import Integral, Real
 
 import numpy as np
@@ -21,13 +21,114 @@ from solver.jit.timer import clock
 from solver.lab import from_lab
 from solver.marching.kernels import march_state as kernel
 from solver.marching.kernels import taylor as stepping
-from solver.marching.march_equations import MarchEquations, as_sparse, equations_of_motion, rows
+from solver.marching.march_equations import MarchEquations, as_sparse, equations_of_motion, limit_of, rows
 from solver.marching.march_result import MarchResult, MarchStatus, describe, of_harmonic
-from solver.marching.march_start import MarchStart, state_at
 from solver.results.watch import shows_progress
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.parameter_paths import check_frequency
 from solver.scene.scene import Excitation, Scene
+from solver.wording import listing
+
+_FRICTION = (kernel.COULOMB, kernel.ELASTIC_NORMAL, kernel.CIRCLE, kernel.CIRCLE_SECOND)
+_INSIDE = 1e-13  # share of the limit that a force stays below it: from there it slips by its rates
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MarchStart:
+    """A motion at the angle 0; what is not named is 0.
+
+    Attributes
+    ----------
+    displacements, velocities : mapping
+        Of degrees of freedom, by their names [m], [m/s].
+    tractions : mapping
+        Friction forces by the names in `MarchResult.contacts` [N]; one beyond the limit there is cut to it.
+    """
+
+    displacements: Mapping[str, float] = field(default_factory=dict)
+    velocities: Mapping[str, float] = field(default_factory=dict)
+    tractions: Mapping[str, float] = field(default_factory=dict)
+
+
+def state_at(
+    equations: MarchEquations,
+    start: MarchStart,
+    names: tuple[str, ...],
+    omega: float,
+    base: tuple[kernel.Real, kernel.Real] | None = None,
+) -> kernel.State:
+    """Return the state of a march.
+
+    Parameters
+    ----------
+    equations : of the scene, at `omega` [rad/s]; names : of the rows of the contacts.
+    base : displacements and velocities (n,) of a base and of what it drives, where they are prescribed.
+
+    Raises
+    ------
+    SettingError
+        An unknown name, a number that is not finite, or a traction of a contact without friction.
+    """
+    system, index = equations.system, equations.index
+    n, rows = system.A.start.size - 1, system.kt.size
+    x = _vector("displacements", start.displacements, index, n)
+    v = _vector("velocities", start.velocities, index, n) / omega
+    for vector, given in zip((x, v), base or (), strict=False):
+        vector[:] = np.where(np.isnan(given), vector, given)
+    if equations.observed not in index.values():
+        for vector in (x, v):
+            vector[equations.observed] = sum(factor * vector[at] for at, factor in equations.seen)
+    load = system.N0 + (system.waves * np.cos(system.wave_phases)).sum(axis=1)
+    moving = np.isin(system.law, (kernel.ELASTIC_NORMAL, kernel.CIRCLE))
+    for c in np.flatnonzero(np.isin(system.law, _FRICTION)):
+        if np.isfinite(system.kn[c]):
+            load[c] += system.kn[c] * kernel.normal_slip(system, x, int(c))
+    for c in np.flatnonzero(system.law == kernel.CIRCLE_SECOND):
+        load[c] = load[c - 1]
+    closed = np.where(moving, load, limit_of(system, load)) > 0.0
+    slips = np.array([kernel.slip(system, x, c) for c in range(rows)])
+    closed = np.where(system.law == kernel.GAP, slips > system.gap, closed) | (
+        system.law == kernel.POLYNOMIAL
+    )
+    closed |= system.law == kernel.HISTORY
+    mode = np.where(closed, kernel.STICK, kernel.SEPARATED).astype(np.int64)
+    force = _forces(system, start.tractions, names, np.maximum(load, 0.0))
+    own = np.zeros((rows, max(int(np.max(system.states, initial=0)), 1)))
+    return kernel.State(x, v, force, mode, own)
+
+
+def _vector(key: str, given: Mapping[str, float], index: Mapping[str, int], n: int) -> kernel.Real:
+    vector = np.zeros(n)
+    for dof, value in given.items():
+        if dof not in index:
+            raise SettingError(key, dof, f"must be of degrees of freedom: {listing(tuple(index))}")
+        if not math.isfinite(value):
+            raise SettingError(key, value, f"must be a number, of {dof!r}")
+        vector[index[dof]] = value
+    return vector
+
+
+def _forces(
+    system: kernel.System, tractions: Mapping[str, float], names: tuple[str, ...], load: kernel.Real
+) -> kernel.Real:
+    """Return the friction forces of the rows, none beyond its limit."""
+    force, limits = np.zeros(system.kt.size), (1.0 - _INSIDE) * limit_of(system, load)
+    for name, traction in tractions.items():
+        if name not in names:
+            raise SettingError("tractions", name, f"must be of contacts with friction: {listing(names)}")
+        at = names.index(name)
+        if system.law[at] not in _FRICTION or not math.isfinite(traction):
+            raise SettingError("tractions", traction, f"must be a friction force in newtons, of {name!r}")
+        force[at] = float(traction)
+    for c in np.flatnonzero(np.isin(system.law, _FRICTION)):
+        if system.law[c] == kernel.CIRCLE_SECOND:
+            continue
+        both = force[c : c + (2 if system.law[c] == kernel.CIRCLE else 1)]
+        size, limit = float(np.hypot.reduce(both)), float(limits[c])
+        if size > limit:
+            both *= limit / size
+    return force
+
 
 FloatArray = NDArray[np.float64]
 LEAST_STEPS = 64
@@ -261,7 +362,20 @@ def steps_for(
 ) -> int:  # fmt: skip
     """Steps of the finer run: the fastest motion turns less than `turn` in one of them [rad]."""
     full = system.W.value.size > system.W.start.size - 1 or bool(np.any(np.abs(system.L.value) != 1.0))
-    turns = 2.0 * math.pi * _fastest(system, BALANCING if full else 1)
+    # Bound of the largest rate of the motion with every contact stuck, per omega: vibration or decay.
+    products = BALANCING if full else 1
+    n = system.A.start.size - 1
+    A, B, W, L, normal = (
+        abs(as_sparse(each, n)) for each in (system.A, system.B, system.W, system.L, system.normal)
+    )
+    stuck = csr_array((n, n))
+    for motions, k in ((L, system.kt), (normal, system.kn)):
+        # Against the ground as if against another part.
+        k = np.where(np.diff(motions.indptr) == 1, 2.0, 1.0) * k
+        stuck = stuck + motions.T @ diags_array(k) @ motions
+    stiffness = _largest(A + W @ stuck, products)
+    damped = B + system.omega * (W @ (L.T @ diags_array(2.0 * system.damping) @ L))
+    turns = 2.0 * math.pi * float(max(math.sqrt(stiffness), _largest(damped, products)))
     load = int(np.max(np.nonzero(system.waves)[1], initial=0)) + 1
     harmonic = max(load, *(force.harmonic for force in forces))
     least = max(least, LEAST_STEPS, 2 * math.ceil(0.25 * turns / turn), 16 * harmonic)
@@ -279,22 +393,6 @@ def order_of(system: kernel.System) -> int:
     if np.any(given & (system.in_steps == 1)):
         return 2
     return 4 if np.any(given) else kernel.ORDER
-
-
-def _fastest(system: kernel.System, products: int) -> float:
-    """Bound of the largest rate of the motion with every contact stuck, per omega: vibration or decay."""
-    n = system.A.start.size - 1
-    A, B, W, L, normal = (
-        abs(as_sparse(each, n)) for each in (system.A, system.B, system.W, system.L, system.normal)
-    )
-    stuck = csr_array((n, n))
-    for motions, k in ((L, system.kt), (normal, system.kn)):
-        # Against the ground as if against another part.
-        k = np.where(np.diff(motions.indptr) == 1, 2.0, 1.0) * k
-        stuck = stuck + motions.T @ diags_array(k) @ motions
-    stiffness = _largest(A + W @ stuck, products)
-    damped = B + system.omega * (W @ (L.T @ diags_array(2.0 * system.damping) @ L))
-    return float(max(math.sqrt(stiffness), _largest(damped, products)))
 
 
 def _largest(matrix: csr_array, products: int) -> float:

@@ -64,7 +64,13 @@ def with_base(
         at = n + i
         held = not swept or (e.base is not None and e.base.motion == "displacement")
         A[at, at], B[at, at], W[at, at] = omega**2 * held, 2.0 * omega * held, 1.0
-        pushes.append((at, *_base_force(e, turn, omega), e.harmonic))
+        # What drives the base to the motion prescribed, at ω.
+        if e.base is None:
+            raise SettingError("excitation", e.place, "must be a base that moves")
+        turning = 1j * e.harmonic * omega
+        steady = e.amplitude * cmath.exp(1j * (e.phase + turn)) / turning ** _ORDERS[e.base.motion]
+        push = steady * (turning + omega) ** 2
+        pushes.append((at, abs(push), cmath.phase(push), e.harmonic))
         for dof, share, phase in e.base.shares if e.base else ():
             shares[index[dof], i] += share * (phase == turn)
     ground = any(e.ground for e, _ in phases)
@@ -179,16 +185,6 @@ def _bases(scene: Scene) -> list[tuple[Excitation, float]]:
     moved = ((e, e.base.shares) for e in scene.excitation if e.base)
     # First the phase 0, that of what a relative motion is counted from.
     return [(e, phase) for e, own in moved for phase in dict.fromkeys((0.0, *(phase for *_, phase in own)))]
-
-
-def _base_force(force: Excitation, turn: float, omega: float) -> tuple[float, float]:
-    """Return amplitude and phase of what drives the base to the motion prescribed, at ω [rad/s]."""
-    if force.base is None:
-        raise SettingError("excitation", force.place, "must be a base that moves")
-    turning = 1j * force.harmonic * omega
-    moved = force.amplitude * cmath.exp(1j * (force.phase + turn)) / turning ** _ORDERS[force.base.motion]
-    push = moved * (turning + omega) ** 2
-    return abs(push), cmath.phase(push)
 
 
 def _grown(matrix: csr_array, n: int) -> FloatArray:
@@ -358,8 +354,32 @@ class MarchEquations:
 _IN_TIME = "cannot be marched in time: it is a term of the frequency domain; give dashpots or damping ratios"
 
 
-def _matrices(structure: LumpedStructure, index: dict[str, int]) -> tuple[Real, csr_array, csr_array]:
-    """Masses [kg] of the points, and damping and stiffness of a lumped structure with bodies."""
+def _equations(scene: Scene) -> tuple[csr_array, csr_array, csr_array, dict[str, int]]:
+    """A = M⁻¹ K, B = M⁻¹ C, W = M⁻¹ and the coordinate of each DOF in use."""
+    structure, bodies = scene.structure, scene.bodies
+    inertias = [csr_array(np.linalg.inv(body.mass_matrix())) for body in bodies]
+    if isinstance(structure, MatricesStructure):
+        # The bodies stand behind the coordinates of a structure given by matrices.
+        own = [dof for body in scene.bodies for dof in body.dofs]
+        ends = [term.dof for forms in scene.forms for form in forms for term in form]
+        pushed = [dof for force in scene.forces for dof, *_ in force.parts]
+        moved = [dof for force in scene.forces if force.base is not None for dof, *_ in force.base.shares]
+        used = [*ends, *pushed, *moved, *(dof for dof, _ in scene.seen(scene.observe.dof) or ())]
+        used += [dof for entry in scene.entries for end in (entry.on, entry.of) for dof in dofs_at(end)]
+        spin = (scene.speed or 0.0) * REVOLUTIONS
+        beside = {*own, *scene.points}
+        *_, index = found = _of_structure(structure, [dof for dof in used if dof not in beside], spin)
+        A, B, W = (csr_array(each) for each in found[:3])
+        if not own:
+            return A, B, W, index
+        nothing, n = csr_array((len(own), len(own))), A.shape[0]
+        A, B = (csr_array(block_diag([each, nothing])) for each in (A, B))
+        W = csr_array(block_diag([W, *inertias]))
+        return A, B, W, index | {dof: n + i for i, dof in enumerate(own)}
+    if not isinstance(structure, LumpedStructure):
+        raise SettingError("scene", scene.name, "must be written out as its annulus to be marched")
+    every = (*structure.dofs, *(dof for body in bodies for dof in body.dofs))
+    index = {dof: i for i, dof in enumerate(every)}
     M = np.array([mass.m for mass in structure.masses])
     k = np.array([spring.k for spring in structure.springs])
     c = np.array([spring.c for spring in structure.springs]) + structure.stiffness_proportional_damping * k
@@ -369,50 +389,15 @@ def _matrices(structure: LumpedStructure, index: dict[str, int]) -> tuple[Real, 
     K = springs.T @ diags_array(k) @ springs
     C = springs.T @ diags_array(c) @ springs + dampers.T @ diags_array(dashpots) @ dampers
     if structure.damping_ratio is not None:
-        root, own = np.sqrt(M), M.size
-        scaled = K.toarray()[:own, :own] / np.outer(root, root)
+        root, points = np.sqrt(M), M.size
+        scaled = K.toarray()[:points, :points] / np.outer(root, root)
         modal = np.outer(root, root) * _modal_damping_root(scaled, structure.damping_ratio)
-        C = csr_array(C) + csr_array(np.pad(modal, (0, len(index) - own)))
-    return M, csr_array(C), csr_array(K)
-
-
-def _equations(scene: Scene) -> tuple[csr_array, csr_array, csr_array, dict[str, int]]:
-    """A = M⁻¹ K, B = M⁻¹ C, W = M⁻¹ and the coordinate of each DOF in use."""
-    structure, bodies = scene.structure, scene.bodies
-    inertias = [csr_array(np.linalg.inv(body.mass_matrix())) for body in bodies]
-    if isinstance(structure, MatricesStructure):
-        return _of_matrices(scene, structure, inertias)
-    if not isinstance(structure, LumpedStructure):
-        raise SettingError("scene", scene.name, "must be written out as its annulus to be marched")
-    every = (*structure.dofs, *(dof for body in bodies for dof in body.dofs))
-    index = {dof: i for i, dof in enumerate(every)}
-    M, C, K = _matrices(structure, index)
+        C = csr_array(C) + csr_array(np.pad(modal, (0, len(index) - points)))
+    C, K = csr_array(C), csr_array(K)
     inverse = diags_array(1.0 / M)
     if bodies:
         inverse = block_diag([inverse, *inertias], format="csr")
     return csr_array(inverse @ K), csr_array(inverse @ C), csr_array(inverse), index
-
-
-def _of_matrices(
-    scene: Scene, structure: MatricesStructure, inertias: list[csr_array]
-) -> tuple[csr_array, csr_array, csr_array, dict[str, int]]:
-    """The same of a structure given by matrices, the bodies behind its coordinates."""
-    own = [dof for body in scene.bodies for dof in body.dofs]
-    ends = [term.dof for forms in scene.forms for form in forms for term in form]
-    pushed = [dof for force in scene.forces for dof, *_ in force.parts]
-    moved = [dof for force in scene.forces if force.base is not None for dof, *_ in force.base.shares]
-    used = [*ends, *pushed, *moved, *(dof for dof, _ in scene.seen(scene.observe.dof) or ())]
-    used += [dof for entry in scene.entries for end in (entry.on, entry.of) for dof in dofs_at(end)]
-    spin = (scene.speed or 0.0) * REVOLUTIONS
-    beside = {*own, *scene.points}
-    *_, index = found = _of_structure(structure, [dof for dof in used if dof not in beside], spin)
-    A, B, W = (csr_array(each) for each in found[:3])
-    if not own:
-        return A, B, W, index
-    nothing, n = csr_array((len(own), len(own))), A.shape[0]
-    A, B = (csr_array(block_diag([each, nothing])) for each in (A, B))
-    W = csr_array(block_diag([W, *inertias]))
-    return A, B, W, index | {dof: n + i for i, dof in enumerate(own)}
 
 
 def _with_couplings(

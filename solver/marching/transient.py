@@ -26,7 +26,17 @@ from solver.errors import SettingError
 from solver.jit.timer import clock
 from solver.marching.kernels import march_state as kernel
 from solver.marching.kernels import taylor as stepping
-from solver.marching.march import RESOLVED, copied, order_of, row_names, settled_state, steps_for, whole
+from solver.marching.march import (
+    RESOLVED,
+    MarchStart,
+    copied,
+    order_of,
+    row_names,
+    settled_state,
+    state_at,
+    steps_for,
+    whole,
+)
 from solver.marching.march_equations import (
     MarchEquations,
     as_sparse,
@@ -37,7 +47,6 @@ from solver.marching.march_equations import (
     moved_to,
 )
 from solver.marching.march_result import MarchStatus, TransientResult, TransientStatus, turning_points
-from solver.marching.march_start import MarchStart, state_at
 from solver.results.watch import OnProgress, ShouldStop, part_of, shows_progress
 from solver.scene.parameter_paths import check_frequency
 from solver.scene.scene import Scene

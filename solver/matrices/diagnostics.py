@@ -177,7 +177,11 @@ def notes(found: MatrixSet, omega2: Real) -> list[str]:
         math.sqrt(max(float(elastic[negative]), 0.0)) / (2.0 * math.pi) if negative < elastic.size else 0.0
     )
     if first and not _SLOW <= first <= _FAST:
-        said.append(_implausible(first))
+        said.append(
+            f"the first elastic frequency is {first:.3g} Hz: are M and K in units that go together? K in "
+            "N/mm goes with M in t, `units` mm, K in N/m with M in kg; N/mm with kg is a factor 32 too "
+            "low, N/m with t a factor 32 too high. Or are M and K swapped?"
+        )
     mass = total_mass(found)
     if mass is not None and 0.0 < mass[1] < _LIGHT:
         said.append(
@@ -190,14 +194,6 @@ def notes(found: MatrixSet, omega2: Real) -> list[str]:
             "taken in the order M K C unless their names say otherwise"
         )
     return said
-
-
-def _implausible(first: float) -> str:
-    return (
-        f"the first elastic frequency is {first:.3g} Hz: are M and K in units that go together? K in N/mm "
-        "goes with M in t, `units` mm, K in N/m with M in kg; N/mm with kg is a factor 32 too "
-        "low, N/m with t a factor 32 too high. Or are M and K swapped?"
-    )
 
 
 def total_mass(found: MatrixSet) -> tuple[str, float] | None:

@@ -194,7 +194,12 @@ def as_kept(
     if keep is None:
         large = next((key for key in sizes if sizes[key] > MOST_DOFS), None)
         if large is not None:
-            raise _refusal(large, _too_large(sizes[large]))
+            raise _refusal(
+                large,
+                f"has {sizes[large]} rows, {MOST_DOFS} are the most without reduction: `stickslip import "
+                "--reduce` reduces them once onto the DOFs in use and modes of the rest; "
+                f"`{KEEP_MODES}` = 40 (say) in [structure] does it whenever the scene is loaded",
+            )
         return {**tables, **{key: Matrix(matrix.toarray()) for key, matrix in sparse.items()}}, None
     if isinstance(keep, bool) or not isinstance(keep, int) or not 0 <= keep <= MOST_DOFS:
         raise _refusal(KEEP_MODES, f"must be a whole number from 0 to {MOST_DOFS}", keep)
@@ -233,11 +238,3 @@ def _reduced(
             turned = given[key].T
             given[key], others[skew] = 0.5 * (given[key] + turned), 0.5 * (given[key] - turned)
     return craig_bampton(given["M"], given["K"], given.get("C"), dofs, keep, others=others)
-
-
-def _too_large(size: int) -> str:
-    return (
-        f"has {size} rows, {MOST_DOFS} are the most without reduction: `stickslip import --reduce` "
-        f"reduces them once onto the DOFs in use and modes of the rest; `{KEEP_MODES}` = 40 (say) in "
-        "[structure] does it whenever the scene is loaded"
-    )

@@ -137,7 +137,29 @@ class Matrix(ByContent):
         if isinstance(data, Matrix):
             return data
         if isinstance(data, dict):
-            return cls(_entries(data))
+            if set(data) != set(_ENTRY_KEYS):
+                got = ", ".join(sorted(map(str, data)))[:200]
+                raise ValueError(
+                    f"a matrix given by its entries has the keys {', '.join(_ENTRY_KEYS)}, got {got}"
+                )
+            size = data["size"]
+            if isinstance(size, bool) or not isinstance(size, int) or not 1 <= size <= MOST_DOFS:
+                raise ValueError(
+                    f"`size` of a matrix must be a whole number from 1 to {MOST_DOFS}, got {str(size)[:80]}"
+                )
+            rows, columns, values = (_numbers(data[key] or [], f"`{key}`") for key in _ENTRY_KEYS[1:])
+            if not rows.size == columns.size == values.size:
+                raise ValueError(
+                    "`rows`, `columns` and `values` must be of one length, "
+                    f"got {rows.size}, {columns.size}, {values.size}"
+                )
+            for key, places in (("rows", rows), ("columns", columns)):
+                bad = places[~((places >= 0) & (places < size) & (places == np.floor(places)))]
+                if bad.size:
+                    raise ValueError(f"`{key}` must be whole numbers from 0 to {size - 1}, got {bad[0]:g}")
+            array = np.zeros((size, size))
+            np.add.at(array, (rows.astype(np.int64), columns.astype(np.int64)), values)
+            return cls(array)
         if isinstance(data, list | tuple):
             return cls(_rows(data, "a matrix", MOST_DOFS))
         if isinstance(data, str):
@@ -297,30 +319,6 @@ def _rows(data: object, what: str, most: int) -> Real:
         if len(row) != width:
             raise ValueError(f"{what}: row {i} has {len(row)} numbers where row 0 has {width}")
     return np.array([_numbers(row, f"{what}, row {i},") for i, row in enumerate(data)]).reshape(-1, width)
-
-
-def _entries(data: dict[str, object]) -> Real:
-    if set(data) != set(_ENTRY_KEYS):
-        got = ", ".join(sorted(map(str, data)))[:200]
-        raise ValueError(f"a matrix given by its entries has the keys {', '.join(_ENTRY_KEYS)}, got {got}")
-    size = data["size"]
-    if isinstance(size, bool) or not isinstance(size, int) or not 1 <= size <= MOST_DOFS:
-        raise ValueError(
-            f"`size` of a matrix must be a whole number from 1 to {MOST_DOFS}, got {str(size)[:80]}"
-        )
-    rows, columns, values = (_numbers(data[key] or [], f"`{key}`") for key in _ENTRY_KEYS[1:])
-    if not rows.size == columns.size == values.size:
-        raise ValueError(
-            "`rows`, `columns` and `values` must be of one length, "
-            f"got {rows.size}, {columns.size}, {values.size}"
-        )
-    for key, places in (("rows", rows), ("columns", columns)):
-        bad = places[~((places >= 0) & (places < size) & (places == np.floor(places)))]
-        if bad.size:
-            raise ValueError(f"`{key}` must be whole numbers from 0 to {size - 1}, got {bad[0]:g}")
-    array = np.zeros((size, size))
-    np.add.at(array, (rows.astype(np.int64), columns.astype(np.int64)), values)
-    return array
 
 
 def differs(array: NDArray[Any], turned: NDArray[Any]) -> bool:

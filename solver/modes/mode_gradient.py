@@ -330,7 +330,18 @@ class _SecondParts:
         self._along = Directions(
             slopes=sensitivities.slopes, loads=sensitivities.loads, level=none, phase=none
         )
-        self._stiffness, self._amplitude = self._of_stiffness(), self._of_amplitude()
+        # Re(x_iᴴ M x_j + x_iᴴ M_j x + x_jᴴ M_i x), (P, P).
+        s, dx = self._of.equations.structure, self._moves.x
+        found: Real = np.einsum("ikn,jkn->ij", dx.conj(), s.times(s.mass, dx)).real
+        for j, parameter in enumerate(self._of.parameters):
+            if parameter.kind is Kind.STRUCTURE:
+                dM = cast(HarmonicMatrices, self._of.matrices).by[j][2]
+                pushed = dM @ (s.shapes @ self._at.x[..., None])
+                pushed = (np.swapaxes(s.shapes, 1, 2).conj() @ pushed)[..., 0]
+                along = np.einsum("ikn,kn->i", dx.conj(), pushed).real
+                found[:, j] += along
+                found[j] += along
+        self._stiffness, self._amplitude = self._of_stiffness(), found
 
     def hessian(self, adjoint: Real) -> Real:
         """Return the second derivatives of the unknown whose multipliers these are, (m,)."""
@@ -348,7 +359,16 @@ class _SecondParts:
         w = equations.motions(equations.amplitudes.coefficients(led.T))
         twice = np.einsum("kn,ijkn->ij", Y.conj(), self._stiffness).real
         twice += contacts_along(self._contacts, self._along, self._moves.ports, w)
-        twice += adjoint[size + 3] * self._amplitude / squared + adjoint[size + 2] * self._of_phase()
+        # The second derivatives of the phase condition Re gᴴ x_1, (P, P).
+        phase = np.zeros((len(self._of.parameters),) * 2)
+        if not self._of.turns:
+            first = self._moves.x[:, self._of.equations.structure.first]
+            turned = (first @ (1j * self._state.phase).conj()).real
+            for i, parameter in enumerate(self._of.parameters):
+                if parameter.kind is Kind.FORCE_PHASE:
+                    phase[i] += turned
+                    phase[:, i] += turned
+        twice += adjoint[size + 3] * self._amplitude / squared + adjoint[size + 2] * phase
         return np.asarray(-0.5 * (twice + twice.T))
 
     def _of_stiffness(self) -> Complex:
@@ -381,29 +401,3 @@ class _SecondParts:
         pushed = dZ @ (s.shapes @ moved[..., None])
         pushed += (by_omega * slope - 2j * by_zeta * k * omega**2 * dM) @ (s.shapes @ self._at.x[..., None])
         return np.asarray((np.swapaxes(s.shapes, 1, 2).conj() @ pushed)[..., 0])
-
-    def _of_amplitude(self) -> Real:
-        """Return Re(x_iᴴ M x_j + x_iᴴ M_j x + x_jᴴ M_i x), (P, P)."""
-        s, dx = self._of.equations.structure, self._moves.x
-        found: Real = np.einsum("ikn,jkn->ij", dx.conj(), s.times(s.mass, dx)).real
-        for j, parameter in enumerate(self._of.parameters):
-            if parameter.kind is Kind.STRUCTURE:
-                dM = cast(HarmonicMatrices, self._of.matrices).by[j][2]
-                pushed = dM @ (s.shapes @ self._at.x[..., None])
-                pushed = (np.swapaxes(s.shapes, 1, 2).conj() @ pushed)[..., 0]
-                along = np.einsum("ikn,kn->i", dx.conj(), pushed).real
-                found[:, j] += along
-                found[j] += along
-        return found
-
-    def _of_phase(self) -> Real:
-        """Return the second derivatives of the phase condition Re gᴴ x_1, (P, P)."""
-        found = np.zeros((len(self._of.parameters),) * 2)
-        if not self._of.turns:
-            first = self._moves.x[:, self._of.equations.structure.first]
-            turned = (first @ (1j * self._state.phase).conj()).real
-            for i, parameter in enumerate(self._of.parameters):
-                if parameter.kind is Kind.FORCE_PHASE:
-                    found[i] += turned
-                    found[:, i] += turned
-        return found

@@ -23,7 +23,7 @@ from solver.contacts.kernels.columns import PRESTRESSED
 from solver.contacts.kernels.system import UNHELD
 from solver.contacts.laws.contact_parts import Slider
 from solver.jit import fourier
-from solver.jit.fourier import Complex, Integer, Real
+from solver.jit.fourier import Integer, Real
 from solver.jit.separate import apart
 from solver.scene.scene_harmonics import Amplitudes
 
@@ -139,10 +139,21 @@ class _Drifting:
         omega = p if balance.parameter.kind is Kind.FREQUENCY else system.omega
         shapes, pulled, damped, most = _dashpots(balance, ways, omega)
         linear = workspace.receptance(p)
+        # As a matrix (nc·n, nc·n) of coefficients.
+        A = linear.A[0]
+        nc, n = A.shape[1], int(fourier.coefficient_count(system.ks))
+        real = np.zeros((nc, n, nc, n))
+        for i, k in enumerate(system.ks):
+            here = int(fourier.cosine_position(system.ks, i))
+            real[:, here, :, here] = A[i].real
+            if k > 0:
+                real[:, here + 1, :, here + 1] = A[i].real
+                real[:, here, :, here + 1] = A[i].imag
+                real[:, here + 1, :, here] = -A[i].imag
         return cls(
             workspace=workspace, p=p, start=held.u.copy(), ways=ways, shapes=shapes, pulled=pulled,
             damped=damped, dragged=bool(np.all(np.diag(damped) > _DRAG * most)),
-            A=_in_real(linear.A[0], system.ks), sliders=tuple(sliders),
+            A=real.reshape(nc * n, nc * n), sliders=tuple(sliders),
             free=Amplitudes(balance.system.ks).coefficients(linear.u_linear[0].T).reshape(-1),
         )  # fmt: skip
 
@@ -312,20 +323,6 @@ def _instants(ks: bytes) -> Real:
     orders = np.frombuffer(ks, np.int64)
     tau = np.asarray(2.0 * math.pi / SAMPLES * np.arange(SAMPLES), np.float64)
     return fourier.from_full(fourier.basis(tau, int(orders[-1])), orders)
-
-
-def _in_real(A: Complex, ks: Integer) -> Real:
-    """Return A (nk, nc, nc) as a matrix (nc·n, nc·n) of coefficients."""
-    nc, n = A.shape[1], int(fourier.coefficient_count(ks))
-    real = np.zeros((nc, n, nc, n))
-    for i, k in enumerate(ks):
-        here = int(fourier.cosine_position(ks, i))
-        real[:, here, :, here] = A[i].real
-        if k > 0:
-            real[:, here + 1, :, here + 1] = A[i].real
-            real[:, here, :, here + 1] = A[i].imag
-            real[:, here + 1, :, here] = -A[i].imag
-    return real.reshape(nc * n, nc * n)
 
 
 @apart

@@ -262,7 +262,13 @@ def _sticks_from_rest(solution: Solution, sticking: tuple[HeldContact, ...]) -> 
         return False
 
     least = [float(np.min(each)) for each in room]
-    start = _start(solution, model, stiffness)
+    # The response of all sectors at τ = 0.
+    ks = np.arange(solution.harmonics.size)
+    amplitudes = all_coordinates(solution)
+    turns = np.exp(1j * np.outer(np.arange(model.sectors), ks) * model.interblade_phase)
+    omega = 2.0 * math.pi * solution.frequency_hz
+    v = (turns @ (1j * omega * ks[:, None] * amplitudes)).real
+    start = Start(model=model, stiffness=stiffness, x=(turns @ amplitudes).real, v=v, omega=omega)
     distance = start.distance(start.x, start.v) + _in_sliders(solution, model, sticking)
     lost = [_most_lost(each.given, distance, *by) for each, by in zip(sticking, reach, strict=True)]
     if all(left > most for left, most in zip(least, lost, strict=True)):
@@ -356,16 +362,6 @@ def _compliances(
         both = float(np.linalg.eigvalsh(block)[-1])
         reach.append((both, both))
     return reach
-
-
-def _start(solution: Solution, model: LinearModel, stiffness: Real) -> Start:
-    """Return the response of all sectors at τ = 0."""
-    ks = np.arange(solution.harmonics.size)
-    amplitudes = all_coordinates(solution)
-    turns = np.exp(1j * np.outer(np.arange(model.sectors), ks) * model.interblade_phase)
-    omega = 2.0 * math.pi * solution.frequency_hz
-    v = (turns @ (1j * omega * ks[:, None] * amplitudes)).real
-    return Start(model=model, stiffness=stiffness, x=(turns @ amplitudes).real, v=v, omega=omega)
 
 
 def _in_sliders(solution: Solution, model: LinearModel, sticking: tuple[HeldContact, ...]) -> float:

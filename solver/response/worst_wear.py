@@ -162,7 +162,14 @@ class _MaximaSearch:
             by_share = share_scales(left, right, self._workspace.balance.system.least_size)
             g_left, g_right = left.slope * by_share[0], right.slope * by_share[1]
             if g_left > 0.0 >= g_right:
-                found.append(self._worst(self._polished(left, right, g_left, g_right), interior=True))
+                # The slope by the share of the chord is brought to 0: it jumps over it at a corner.
+                best = left if left.value >= right.value else right
+                at = partial(self._between, left, right)
+                for node, slope, width in closing_in(at, attrgetter("slope"), g_left, g_right):
+                    best = node if node.value >= best.value else best
+                    if abs(slope) <= _FLAT * self._size or width <= _NARROW:
+                        break
+                found.append(self._worst(best, interior=True))
         first, last = self._nodes[0], self._nodes[-1]
         if len(self._nodes) == 1 or first.slope <= 0.0:
             found.append(self._worst(first, interior=False))
@@ -190,19 +197,6 @@ class _MaximaSearch:
         middle = self._between(left, right, 0.5)
         cubic = 0.5 * (left.value + right.value) + (g_left - g_right) / 8.0
         return middle, middle is None or abs(cubic - middle.value) <= PREDICTED * self._size
-
-    def _polished(self, left: _Node, right: _Node, g_left: float, g_right: float) -> _Node:
-        """Return the maximum between two nodes: the slope by the share of the chord brought to 0.
-
-        At a corner the slope jumps over 0. Where no solution is found the best one stands in.
-        """
-        best = left if left.value >= right.value else right
-        at = partial(self._between, left, right)
-        for node, slope, width in closing_in(at, attrgetter("slope"), g_left, g_right):
-            best = node if node.value >= best.value else best
-            if abs(slope) <= _FLAT * self._size or width <= _NARROW:
-                break
-        return best
 
     def _on_branch(self, solutions: Real, tangents: Real) -> list[_Node]:
         """Return the points of the branch: the work at all of them at once."""

@@ -130,17 +130,14 @@ class _Reader:
             before = above.keys.get(path[-1])
             table.keys = before.keys if before is not None else {}
             above.keys[path[-1]] = table
-        table.blocks.append([self._with_comments(begin), len(self._text)])
-        return table
-
-    def _with_comments(self, begin: int) -> int:
-        """The beginning of the comment lines right above a header."""
+        # From the beginning of the comment lines right above the header.
         while begin:
-            above = self._text.rfind("\n", 0, begin - 1) + 1
-            if not self._text[above:begin].lstrip(" \t").startswith("#"):
+            line = self._text.rfind("\n", 0, begin - 1) + 1
+            if not self._text[line:begin].lstrip(" \t").startswith("#"):
                 break
-            begin = above
-        return begin
+            begin = line
+        table.blocks.append([begin, len(self._text)])
+        return table
 
     @staticmethod
     def _close_blocks(root: TextPlace) -> None:
@@ -345,7 +342,27 @@ class _Edits:
             and all(map(_is_table, wanted))
             and wanted
         ):
-            self._tables(place, held, wanted, path)
+            # The entries of ``[[path]]``.
+            sources = _paired(held, wanted)
+            for i, item in enumerate(place.items):
+                if i not in sources:
+                    self._remove(item)
+            last = max(block[1] for part in place.items[0].parts() for block in part.blocks)
+            at = place.items[0].blocks[0][0] if sources[0] is None else last
+            name = ".".join(map(key_text, path))
+            new: dict[int, list[str]] = {}
+            for source, value in zip(sources, wanted, strict=True):
+                if source is None:
+                    new.setdefault(at, []).append(f"[[{name}]]\n{_lines(value)}")
+                    continue
+                item = place.items[source]
+                at = max(block[1] for part in item.parts() for block in part.blocks)
+                if not _same(held[source], value):
+                    self._table(item, held[source], value, path)
+            for where, texts in new.items():
+                before = "" if not where or self._text[:where].endswith("\n\n") else "\n"
+                after = "\n" if where < len(self._text) else ""
+                self._cuts.append((where, where, before + "\n".join(texts) + after))
         elif len(path) == 1 and (place.blocks or place.kind is WritingKind.TABLES or held == []):
             self._remove(place)
             self._add({path[0]: wanted})
@@ -353,29 +370,6 @@ class _Edits:
             self._cuts.append((place.first, place.last, self._value(place, held, wanted)))
         else:
             raise _UnwritableError
-
-    def _tables(self, place: TextPlace, held: list[Any], wanted: list[Any], path: tuple[str, ...]) -> None:
-        """The entries of ``[[path]]``."""
-        sources = _paired(held, wanted)
-        for i, item in enumerate(place.items):
-            if i not in sources:
-                self._remove(item)
-        last = max(block[1] for part in place.items[0].parts() for block in part.blocks)
-        at = place.items[0].blocks[0][0] if sources[0] is None else last
-        name = ".".join(map(key_text, path))
-        new: dict[int, list[str]] = {}
-        for source, value in zip(sources, wanted, strict=True):
-            if source is None:
-                new.setdefault(at, []).append(f"[[{name}]]\n{_lines(value)}")
-                continue
-            item = place.items[source]
-            at = max(block[1] for part in item.parts() for block in part.blocks)
-            if not _same(held[source], value):
-                self._table(item, held[source], value, path)
-        for where, texts in new.items():
-            before = "" if not where or self._text[:where].endswith("\n\n") else "\n"
-            after = "\n" if where < len(self._text) else ""
-            self._cuts.append((where, where, before + "\n".join(texts) + after))
 
     def _remove(self, place: TextPlace) -> int:
         """Take out what stands at a place; where it began."""
@@ -426,7 +420,10 @@ class _Edits:
             for source, value in zip(sources, wanted, strict=True)
         ]
         if "\n" not in self._text[place.first : place.last]:
-            return _in_a_line(words, may_break=None in sources)
+            line = f"[{', '.join(words)}]"
+            if None in sources and len(line) > MOST_INLINE:
+                return "[\n" + "".join(f"  {word},\n" for word in words) + "]"
+            return line
         around, rest = self._around(place)
         indent = around[0][0].rpartition("\n")[2]
         out: list[str] = []
@@ -457,14 +454,6 @@ class _Edits:
             at = line + 1 if line >= 0 else comma + 1 if comma >= 0 else item.last
             found.append((lead, self._text[item.last : at]))
         return found, self._text[at : place.last - 1]
-
-
-def _in_a_line(words: list[str], *, may_break: bool) -> str:
-    """Entries of a list in one line, or a line each where it grew long."""
-    line = f"[{', '.join(words)}]"
-    if may_break and len(line) > MOST_INLINE:
-        return "[\n" + "".join(f"  {word},\n" for word in words) + "]"
-    return line
 
 
 def _is_table(value: object) -> bool:

@@ -49,10 +49,22 @@ def scene_schema() -> dict[str, Any]:
     found = Scene.model_json_schema(schema_generator=_Generator)
     definitions: dict[str, Any] = found["$defs"]
     for name, definition in definitions.items():
-        _describe(definition, _model(name), name)
+        kinds = (*laws().values(), *linear_terms.coupling_kinds().values())
+        by_name: dict[str, type[BaseModel]] = {each.__name__: each for each in kinds}
+        model = by_name.get(name) or next(getattr(home, name) for home in _HOMES if hasattr(home, name))
+        _describe(definition, model, name)
     _describe(found, Scene, "Scene")
     _matrices(definitions["MatricesStructure"]["properties"])
-    _boundaries(definitions["CyclicBoundary"]["properties"])
+    properties = definitions["CyclicBoundary"]["properties"]
+    nodes = {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "integer"}, "minItems": 1}]}
+    properties |= {
+        "low": dict(nodes), "high": dict(nodes), "nodes": {"type": "string"},
+        "pair_by": {"enum": ["position", "order"], "default": "position"},
+        "tolerance": {"type": "number", "exclusiveMinimum": 0.0},
+        "keep_modes": {"type": "integer", "minimum": 0},
+    }  # fmt: skip
+    for key, text in WORDS["CyclicBoundary"].items():
+        properties[key]["description"] = text
     number = {"type": "number", "exclusiveMinimum": 0.0, "description": "Mass [kg]."}
     for name in ("LumpedStructure", "CyclicStructure"):
         masses = definitions[name]["properties"]["masses"]
@@ -109,29 +121,18 @@ def plain(schema: Any) -> Any:
     return {plain(key): plain(value) for key, value in kept.items()}
 
 
-def _model(name: str) -> type[BaseModel]:
-    kinds = (*laws().values(), *linear_terms.coupling_kinds().values())
-    by_name: dict[str, type[BaseModel]] = {each.__name__: each for each in kinds}
-    return by_name.get(name) or next(getattr(home, name) for home in _HOMES if hasattr(home, name))
-
-
 def _describe(definition: dict[str, Any], model: type[BaseModel], name: str) -> None:
     """Put the words of a model and of its fields into its schema."""
     words = words_of(model) | WORDS.get("*", {}) | WORDS.get(name, {})
     if issubclass(model, AnyContact):
-        words |= {"law": _law_words(), **model.WORDS}
+        first, *others, last = laws()
+        words |= {"law": f"{', '.join([f'{first} (also if left out)', *others])} or {last}.", **model.WORDS}
     definition["description"] = " ".join((model.__doc__ or "").partition("\nAttributes\n")[0].split())
     for key, given in definition["properties"].items():
         if key in words:
             given["description"] = words[key]
         if key in EXAMPLES:
             given["examples"] = EXAMPLES[key]
-
-
-def _law_words() -> str:
-    """What is said of the key `law`: every law there is."""
-    first, *others, last = laws()
-    return f"{', '.join([f'{first} (also if left out)', *others])} or {last}."
 
 
 def words_of(model: type[BaseModel]) -> dict[str, str]:
@@ -158,17 +159,4 @@ def _matrices(properties: dict[str, Any]) -> None:
     properties["diameters"] |= {"anyOf": [{"type": "string"}, {"type": "object"}]}
     properties["outline"] |= {"type": "object"}
     for key, text in WORDS["MatricesStructure"].items():
-        properties[key]["description"] = text
-
-
-def _boundaries(properties: dict[str, Any]) -> None:
-    """The keys of [structure.cyclic] that name nodes, as a file gives them."""
-    nodes = {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "integer"}, "minItems": 1}]}
-    properties |= {
-        "low": dict(nodes), "high": dict(nodes), "nodes": {"type": "string"},
-        "pair_by": {"enum": ["position", "order"], "default": "position"},
-        "tolerance": {"type": "number", "exclusiveMinimum": 0.0},
-        "keep_modes": {"type": "integer", "minimum": 0},
-    }  # fmt: skip
-    for key, text in WORDS["CyclicBoundary"].items():
         properties[key]["description"] = text

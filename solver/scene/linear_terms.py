@@ -87,7 +87,7 @@ class LinearTerm(Part, ABC):
     KIND: ClassVar[str] = ""
     """Its `kind` in ``[[couplings]]``; one from outside has a field `kind` of that word."""
     DOFS: ClassVar[tuple[str, ...]] = ()
-    """Its fields that name a DOF."""
+    """Its fields that name a DOF, or several; `of` is of the sector `offset` ahead, where it has that."""
     TURNING: ClassVar[tuple[str, ...]] = ()
     """Its fields that need a speed of rotation."""
     PARAMETERS: ClassVar[Mapping[str, str]] = {}
@@ -121,8 +121,14 @@ class LinearTerm(Part, ABC):
 
     def in_sector(self, named: Callable[[str, int], str]) -> Self:
         """The same in one sector of a disk that is written out; `named` names a DOF so many sectors ahead."""
-        given = {key: dof for key in self.DOFS if (dof := getattr(self, key)) is not None}
-        return self.model_copy(update={key: named(dof, 0) for key, dof in given.items()})
+        moved: dict[str, object] = {} if getattr(self, "offset", None) is None else {"offset": 0}
+        for key in self.DOFS:
+            dof, ahead = getattr(self, key), getattr(self, "offset", 0) if key == "of" else 0
+            if isinstance(dof, tuple):
+                moved[key] = tuple(named(each, ahead) for each in dof)
+            elif dof is not None:
+                moved[key] = named(dof, ahead)
+        return self.model_copy(update=moved)
 
 
 class Coupling(LinearTerm):
@@ -174,11 +180,6 @@ class Coupling(LinearTerm):
             return (first,)
         back = Entry(self.of, self.on, -self.offset, -k, -self.c, -self.gyroscopic, -self.k_omega2)
         return first, back
-
-    def in_sector(self, named: Callable[[str, int], str]) -> Self:
-        """The same between the DOFs of two sectors."""
-        ends = {"on": named(self.on, 0), "of": named(self.of, self.offset)}
-        return self.model_copy(update={**ends, "offset": 0})
 
 
 class MaxwellBranch(LinearTerm):
@@ -242,13 +243,6 @@ class MaxwellBranch(LinearTerm):
         if self.of is not None:
             return tuple(joined)
         return (*joined, Entry(self.point, self.point, 0, 0.0, c, 0.0, 0.0))
-
-    def in_sector(self, named: Callable[[str, int], str]) -> Self:
-        """The same between the DOFs of two sectors."""
-        of = None if self.of is None else named(self.of, self.offset)
-        return self.model_copy(
-            update={"on": named(self.on, 0), "point": named(self.point, 0), "of": of, "offset": 0}
-        )
 
 
 _NEGATIVE = 1e-8  # of the largest eigenvalue: less is rounding of 0 in a file
@@ -328,11 +322,6 @@ class ViscoelasticPart(LinearTerm):
             joined = ((motion, motion, k), (motion, point, -k), (point, motion, -k))
             found += [Entry(a, b, 0, value, 0.0, 0.0, 0.0) for a, b, value in joined]
         return tuple(found)
-
-    def in_sector(self, named: Callable[[str, int], str]) -> Self:
-        """The same in one sector of a disk that is written out."""
-        on = None if self.on is None else tuple(named(dof, 0) for dof in self.on)
-        return self.model_copy(update={"on": on, "point": named(self.point, 0)})
 
 
 @lru_cache(maxsize=64)

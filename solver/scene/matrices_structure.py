@@ -16,7 +16,7 @@ from solver.matrices.matrix_validation import (
     check_matrices,
     symmetric,
 )
-from solver.matrices.sectors.elimination import Elimination, elimination
+from solver.matrices.sectors.elimination import elimination
 from solver.matrices.sectors.outline import SectorOutline
 from solver.matrices.sectors.sector_parts import DiameterMatrices, PartMatrices
 from solver.matrices.values import MOST_MODES, Matrix, NormalModes
@@ -43,9 +43,30 @@ def check_sector(sector: MatricesStructure, spinning: Collection[str]) -> None:
         if sector.M is not None:
             found = elimination(sector.M.size, low, high, sector.cyclic.axis, count)
             away = np.setdiff1d(np.arange(sector.M.size), found.kept).tolist()
-            _check_kept(sector.dofs, set(away))
-            _check_parts(sector.parts, sector.M.size)
-            _check_mass(sector.M, found, count)
+            for name, row in sector.dofs.write().items():
+                if row in away:
+                    raise ValueError(
+                        f"`dofs`: {name!r} is row {row}, on the high boundary: name the DOF of the low "
+                        "boundary that it is paired with; in contacts it is NAME@next"
+                    )
+            size = sector.M.size
+            for name, matrix in zip(
+                sector.parts or (), () if sector.parts is None else sector.parts.matrices, strict=True
+            ):
+                if matrix.size != size:
+                    raise ValueError(f"`parts`: {name!r} must have {size} rows like M, got {matrix.size}")
+            # M must be positive definite once the high boundary has joined the low one.
+            try:
+                check_definite(sector.M.array)
+            except ValueError:
+                joined = found.of(sector.M.array)
+                for n in range(count // 2 + 1):
+                    try:
+                        check_definite(joined.at(n, count))
+                    except ValueError as error:
+                        raise ValueError(
+                            f"{error} (boundaries joined, at nodal diameter {n}, rows without the high one)"
+                        ) from error
         return
     if sector.M is not None or low is not None or high is not None:
         raise ValueError(
@@ -66,36 +87,6 @@ def check_sector(sector: MatricesStructure, spinning: Collection[str]) -> None:
             "what is unsymmetric as [[couplings]] of the DOFs in use"
         )
     _check_diameters(sector.diameters, count, sector.dofs)
-
-
-def _check_kept(dofs: DofTable, away: set[int]) -> None:
-    for name, row in dofs.write().items():
-        if row in away:
-            raise ValueError(
-                f"`dofs`: {name!r} is row {row}, on the high boundary: name the DOF of the low boundary that "
-                "it is paired with; in contacts it is NAME@next"
-            )
-
-
-def _check_mass(M: Matrix, found: Elimination, count: int) -> None:
-    """Raise ValueError unless M is positive definite once the high boundary has joined the low one."""
-    try:
-        check_definite(M.array)
-    except ValueError:
-        joined = found.of(M.array)
-        for n in range(count // 2 + 1):
-            try:
-                check_definite(joined.at(n, count))
-            except ValueError as error:
-                raise ValueError(
-                    f"{error} (boundaries joined, at nodal diameter {n}, rows without the high one)"
-                ) from error
-
-
-def _check_parts(parts: PartMatrices | None, size: int) -> None:
-    for name, matrix in zip(parts or (), () if parts is None else parts.matrices, strict=True):
-        if matrix.size != size:
-            raise ValueError(f"`parts`: {name!r} must have {size} rows like M, got {matrix.size}")
 
 
 def _check_diameters(found: DiameterMatrices, count: int, dofs: DofTable) -> None:

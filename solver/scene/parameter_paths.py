@@ -293,7 +293,14 @@ def with_values(scene: _SceneT, values: Mapping[str, float]) -> _SceneT:
     if len(values) > 1:
         _check_together(scene, values)
     for path, new in values.items():
-        scene = _with_value(scene, path, _number(path, new))
+        try:
+            number = float(new)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise SettingError(str(path), new, "must be a number") from error
+        rigid = path.endswith((".kt", ".kn")) and number == math.inf
+        if isinstance(new, str | bool) or not (rigid or math.isfinite(number)):
+            raise SettingError(str(path), new, "must be a finite number")
+        scene = _with_value(scene, path, number)
     return scene
 
 
@@ -336,17 +343,6 @@ def _with_value(scene: _SceneT, path: str, new: float) -> _SceneT:
     if of_bodies.SPEED in update and scene.with_speed:
         return cast(_SceneT, at_speed(scene, new))
     return scene.model_copy(update=update)
-
-
-def _number(path: str, new: object) -> float:
-    try:
-        number = float(new)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError) as error:
-        raise SettingError(str(path), new, "must be a number") from error
-    rigid = path.endswith((".kt", ".kn")) and number == math.inf
-    if isinstance(new, str | bool) or not (rigid or math.isfinite(number)):
-        raise SettingError(str(path), new, "must be a finite number")
-    return number
 
 
 def _unknown(scene: Scene, path: object, *besides: str) -> SettingError:

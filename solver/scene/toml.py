@@ -77,7 +77,14 @@ def load_raw(name_or_path: object) -> dict[str, object]:
     except UnicodeDecodeError as error:
         raise _refusal(f"{str(path)!r} is not UTF-8 text (byte {error.start}): not a scene file") from error
     except (OSError, ValueError) as error:
-        raise _refusal(_not_found(str(name_or_path), error)) from error
+        name = str(name_or_path)
+        known = ", ".join(shipped_scenes())
+        near = difflib.get_close_matches(name, shipped_scenes(), n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise _refusal(
+            f"no scene {name!r}: neither a shipped scene ({known}) nor a readable file ({reason}){hint}"
+        ) from error
     return _parse(text, str(path), path.suffix.lower())
 
 
@@ -109,14 +116,6 @@ def _without_duplicates(pairs: list[tuple[str, object]]) -> dict[str, object]:
             raise _refusal(f"`{key}` is given twice in one table: {table[key]!r} and {value!r}; keep one")
         table[key] = value
     return table
-
-
-def _not_found(name: str, error: Exception) -> str:
-    known = ", ".join(shipped_scenes())
-    near = difflib.get_close_matches(name, shipped_scenes(), n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
-    reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-    return f"no scene {name!r}: neither a shipped scene ({known}) nor a readable file ({reason}){hint}"
 
 
 def _refusal(message: str) -> SceneError:

@@ -93,15 +93,6 @@ def between_keys() -> tuple[str, ...]:
     return tuple(dict.fromkeys(key for law in laws().values() for key in law.END_KEYS))
 
 
-def _tags(table: str) -> tuple[str, tuple[str, ...]]:
-    """The key that tells the kinds of a table apart, and its words."""
-    words = {
-        "contacts": ("law", tuple(laws())), "dampers": ("shape", tuple(SHAPES)),
-        "couplings": ("kind", tuple(coupling_kinds())),
-    }  # fmt: skip
-    return words.get(table, ("kind", KINDS))
-
-
 def _keys_of_kinds() -> dict[tuple[str, ...], tuple[str, tuple[str, ...]]]:
     """Name and known keys of the contacts of each law, and of the couplings of each kind."""
     found: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
@@ -165,7 +156,12 @@ def _field_issue(found: ErrorDetails, raw: dict[str, Any]) -> Issue:
         hint = f"known keys: {listing(keys)}{nearest(str(place[-1]), keys)}"
         return Issue(place, f"= {quoted(last)} is not a key of {table}; {hint}")
     if kind in ("union_tag_invalid", "union_tag_not_found"):
-        tag, tags = _tags(str(steps[0]) if steps else "")
+        # The key that tells the kinds of a table apart, and its words.
+        words = {
+            "contacts": ("law", tuple(laws())), "dampers": ("shape", tuple(SHAPES)),
+            "couplings": ("kind", tuple(coupling_kinds())),
+        }  # fmt: skip
+        tag, tags = words.get(str(steps[0]) if steps else "", ("kind", KINDS))
         got = last.get(tag) if isinstance(last, dict) else None
         hint = nearest(got, tags) if isinstance(got, str) else ""
         return Issue((*steps, tag), f"must be one of {listing(tags)}", Shown(quoted(got) + hint))
@@ -214,11 +210,13 @@ def cross_issues(raw: dict[str, Any]) -> list[Issue]:
     table = "dofs" if structure.get("kind") == "matrices" else "masses"
     dofs = dofs_of(raw)
     cyclic = is_cyclic(structure)
+    parts = ((steps, row.get("name")) for steps, row in parts_of(structure))
+    named = [((*steps, "name"), name) for steps, name in parts if isinstance(name, str)]
     found = chain(
         _reserved_dofs(dofs or (), table, cyclic),
         _end_issues(raw, structure, dofs, cyclic),
         _dof_issues(raw, dofs, structure.get("sectors") if cyclic else 0),
-        duplicates(_structure_names(structure), "structure"),
+        duplicates(named, "structure"),
         _contact_name_issues(raw, cyclic),
         wave_issues(raw, "engine_order"),
     )
@@ -364,10 +362,6 @@ def parts_of(structure: dict[str, Any]) -> Iterator[tuple[Place, dict[str, Any]]
     for key in ("springs", "dampers"):
         for steps, row in rows_of(structure, key):
             yield ("structure", *steps), row
-
-
-def _structure_names(structure: dict[str, Any]) -> _Named:
-    return [((*s, "name"), row["name"]) for s, row in parts_of(structure) if isinstance(row.get("name"), str)]
 
 
 def duplicates(named: _Named, what: str) -> Iterator[Issue]:

@@ -420,7 +420,13 @@ class Sensitivities:
         u, omega = np.ascontiguousarray(solution, dtype=np.float64), TWO_PI * at_hz
         try:
             motion = whole_motion(self.balance.system, self._matrices, self._dampings, omega)
-            contacts, along = contact_forces(self.balance.system, self._seconds, u), self._directions()
+            level, phase = excitation_slopes(self.balance, self._parameters)
+            along = Directions(
+                slopes=np.concatenate([np.zeros((1, *self._slopes.shape[1:])), self._slopes]),
+                loads=np.concatenate([np.zeros((1, *self._loads.shape[1:])), self._loads]),
+                level=np.append(0.0, level), phase=np.append(0.0, phase),
+            )  # fmt: skip
+            contacts = contact_forces(self.balance.system, self._seconds, u)
             found = self._responses(u, omega, motion, contacts, along)
         except (np.linalg.LinAlgError, FloatingPointError):
             return None
@@ -460,15 +466,6 @@ class Sensitivities:
         both = 0.5 * np.array([[1.0, 1.0], [1.0, -1.0]])  # half the range, and the mean, of max x and −min x
         by = np.array([by_half, by_mean]) @ both
         return turns, by, both.T @ np.array(seconds)[[[0, 1], [1, 2]]] @ both
-
-    def _directions(self) -> Directions:
-        """Return what ω and every path change."""
-        level, phase = excitation_slopes(self.balance, self._parameters)
-        return Directions(
-            slopes=np.concatenate([np.zeros((1, *self._slopes.shape[1:])), self._slopes]),
-            loads=np.concatenate([np.zeros((1, *self._loads.shape[1:])), self._loads]),
-            level=np.append(0.0, level), phase=np.append(0.0, phase),
-        )  # fmt: skip
 
     def _responses(
         self, u: Real, omega: float, motion: WholeMotion, contacts: ContactForces, along: Directions

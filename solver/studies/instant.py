@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from solver.errors import SettingError
+from solver.marching.march import MarchStart
 from solver.marching.march_equations import rows
-from solver.marching.march_start import MarchStart
 from solver.response.solution import Solution
 from solver.response.time_history import motion
 from solver.scene.scene import LumpedStructure

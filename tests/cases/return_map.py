@@ -10,8 +10,8 @@ from solver import (
 )
 from solver.linear.assembly import linear_model
 from solver.marching.kernels import taylor as kernel
+from solver.marching.march import MarchStart, state_at
 from solver.marching.march_equations import equations_of_motion
-from solver.marching.march_start import MarchStart, state_at
 from solver.scene.scene import CyclicStructure
 
 

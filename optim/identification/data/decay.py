@@ -159,21 +159,15 @@ class _DecayModel(FollowedMode):
         names, found = self.looked_at({**values, **run.conditions}, np.exp(self._s))
         course = _course(self._s, found, slides=self._slides)
         if course is None:
-            n = run.observations.size
-            nothing = np.full((n, len(self._paths)), np.nan)
-            return Predicted(values=np.full(n, np.nan), slopes=nothing, reached=np.zeros(n, bool))
+            return Predicted.nothing(run.observations.size, len(self._paths))
         shift, by_shift = _shift(course, run)
         along = course.at(run.x + shift)
         along = replace(along, by_paths=along.by_paths + np.outer(along.speed, by_shift))
         columns = {"modal_amplitude": (np.exp(along.s), np.exp(along.s)[:, None] * along.by_paths)}
         columns["frequency"] = course.hertz(along)
-        predicted = np.concatenate([columns[name][0] for name in run.data])
-        slopes = np.vstack([columns[name][1] for name in run.data])
         near = np.abs(np.nan_to_num(along.s)[:, None] - self._s).argmin(axis=1)
-        return Predicted(
-            values=predicted, slopes=slopes, reached=np.isfinite(predicted) & np.isfinite(slopes).all(axis=1),
-            states={name: found.states[near, c] for c, name in enumerate(names)},
-        )  # fmt: skip
+        states = {name: found.states[near, c] for c, name in enumerate(names)}
+        return Predicted.of([columns[name] for name in run.data], states)
 
 
 def _course(s: Real, found: ModePoints, *, slides: bool) -> _Course | None:
@@ -260,13 +254,7 @@ def _shift(course: _Course, run: DecayRun) -> tuple[float, Real]:
 
 
 def read_decay(scene: Scene, table: Table) -> MeasuredRows:
-    """Read the table of one run.
-
-    Raises
-    ------
-    DataError
-        What is wrong, with its line.
-    """
+    """As `DataKind.read` says."""
     table.need(4, "points")
     check_monotone(table, "time")
     at, data, sd = columns_of(table, ("time",), _MEASURED)

@@ -111,8 +111,7 @@ class _LoopModel(RunModel):
         found = LoopSensitivities(balance, run.contact, paths).force(motion, 2.0 * math.pi * run.frequency_hz)
         n = run.force.size - 1
         if found is None:
-            nothing = np.full((n, len(paths)), np.nan)
-            return Predicted(values=nothing[:, 0].copy(), slopes=nothing, reached=np.zeros(n, bool))
+            return Predicted.nothing(n, len(paths))
         force, slopes, state = found
         full, by = (to_full(each, ks, int(ks[-1]))[..., 1 : n + 1] for each in (force, slopes))
         return Predicted(
@@ -122,13 +121,7 @@ class _LoopModel(RunModel):
 
 
 def read_loop(scene: Scene, table: Table) -> MeasuredRows:
-    """Read the table of one loop.
-
-    Raises
-    ------
-    DataError
-        What is wrong, with its line.
-    """
+    """As `DataKind.read` says."""
     table.need(FEWEST, "samples of one period")
     counts = scene.port_counts
     names = [each.name for each, count in zip(scene.contacts, counts, strict=True) if count == 1]
@@ -144,8 +137,21 @@ def read_loop(scene: Scene, table: Table) -> MeasuredRows:
         np.asarray(np.linalg.lstsq(basis, table.columns[name], rcond=None)[0], np.float64)
         for name in ("motion", "force")
     )
-    motion = _without_noise(motion)
-    _check_turn(table, motion, force)
+    # Harmonics of the motion that stand above its noise, judged by its upper half.
+    pairs = motion[1:].reshape(-1, 2)
+    noise = float(np.sqrt(np.mean(pairs[pairs.shape[0] // 2 :] ** 2)))
+    kept = np.linalg.norm(pairs, axis=1) > _OVER_NOISE * noise
+    kept[0] = True
+    motion = np.append(motion[0], (pairs * kept[:, None]).ravel())
+    # A loop that feeds energy is refused: friction dissipates, ∮ f du > 0.
+    u, f = motion[1:].reshape(-1, 2), force[1:].reshape(-1, 2)
+    area = math.pi * float(np.sum(np.arange(1, len(u) + 1) * (f[:, 0] * u[:, 1] - f[:, 1] * u[:, 0])))
+    box = 4.0 * float(np.linalg.norm(u) * np.linalg.norm(f))
+    if box == 0.0 or area < -_BACKWARD * box:
+        wanted = (
+            "must be a loop that dissipates, ∮ force d(motion) > 0: look at the signs of force and motion"
+        )
+        raise table.refusal(f"{area:.4g} J", wanted)
     sd = table.columns.get("loop_sd")
     return LoopRun(
         source=table.source, conditions=dict(table.conditions), contact=contact, frequency_hz=frequency,
@@ -168,27 +174,6 @@ def _phases(table: Table, frequency: float) -> Real:
         )
         raise table.refusal(float(time[-1] - time[0]), wanted, "time")
     return np.asarray(tau)
-
-
-def _without_noise(motion: Real) -> Real:
-    """Return the motion with those harmonics that stand above its noise, judged by its upper half."""
-    pairs = motion[1:].reshape(-1, 2)
-    noise = float(np.sqrt(np.mean(pairs[pairs.shape[0] // 2 :] ** 2)))
-    kept = np.linalg.norm(pairs, axis=1) > _OVER_NOISE * noise
-    kept[0] = True
-    return np.append(motion[0], (pairs * kept[:, None]).ravel())
-
-
-def _check_turn(table: Table, motion: Real, force: Real) -> None:
-    """Refuse a loop that feeds energy: friction dissipates, ∮ f du > 0."""
-    u, f = motion[1:].reshape(-1, 2), force[1:].reshape(-1, 2)
-    area = math.pi * float(np.sum(np.arange(1, len(u) + 1) * (f[:, 0] * u[:, 1] - f[:, 1] * u[:, 0])))
-    box = 4.0 * float(np.linalg.norm(u) * np.linalg.norm(f))
-    if box == 0.0 or area < -_BACKWARD * box:
-        wanted = (
-            "must be a loop that dissipates, ∮ force d(motion) > 0: look at the signs of force and motion"
-        )
-        raise table.refusal(f"{area:.4g} J", wanted)
 
 
 def _angles(count: int) -> Real:

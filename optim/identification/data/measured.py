@@ -36,6 +36,20 @@ class Predicted:
         Mapping[str, Integer], "Contact to the state codes it had, (n_points,); -1 where not reached."
     ] = field(default_factory=dict)
 
+    @classmethod
+    def of(
+        cls, columns: Sequence[tuple[Real, Real]], states: Mapping[str, Integer] | None = None
+    ) -> Predicted:
+        """Return what columns (m,) with their slopes (m, n_paths) come to; reached is what has both."""
+        values, slopes = np.concatenate([one for one, _ in columns]), np.vstack([by for _, by in columns])
+        reached = np.isfinite(values) & np.isfinite(slopes).all(axis=1)
+        return cls(values=values, slopes=slopes, reached=reached, states=states or {})
+
+    @classmethod
+    def nothing(cls, n: int, n_paths: int) -> Predicted:
+        """Return that no point was reached."""
+        return cls.of([(np.full(n, np.nan), np.full((n, n_paths), np.nan))])
+
 
 class RunModel(ABC):
     """The responses of a run over parameter values; keeps solutions to start the next from."""
@@ -132,7 +146,8 @@ class DataKind:
     words: Annotated[Mapping[str, str], "What its head may say besides, each with its meaning."]
     read: Annotated[
         Callable[[Scene, Table], MeasuredRows],
-        "From a scene and the table of one run, checked for numbers, to the run.",
+        "From a scene and the table of one run, checked for numbers, to the run; DataError says what is "
+        "wrong, with its line.",
     ]
 
 

@@ -78,9 +78,7 @@ class _PeakModel(RunModel):
                 found[row], slopes[row] = _peak(branch, self._paths)
         if "level" in run.at and AMPLITUDE in self._paths:  # the level stands in its place
             slopes[:, self._paths.index(AMPLITUDE)] = 0.0
-        return Predicted(
-            values=found, slopes=slopes, reached=np.isfinite(found) & np.isfinite(slopes).all(axis=1)
-        )
+        return Predicted.of([(found, slopes)])
 
     def _branches(self, scene: Scene, blades: np.ndarray | None, count: int) -> list[Branch | None]:
         """Return the responses of blades, or so many times that of the DOF; None where one did not reach."""
@@ -104,13 +102,7 @@ def _peak(branch: Branch | None, paths: tuple[str, ...]) -> tuple[float, Real]:
 
 
 def read_peak(scene: Scene, table: Table) -> MeasuredRows:
-    """Read the table of one run.
-
-    Raises
-    ------
-    DataError
-        What is wrong, with its line.
-    """
+    """As `DataKind.read` says."""
     table.need(1, "peaks")
     at, data, sd = columns_of(table, ("blade", "level"), _MEASURED)
     if "level" in at:

@@ -105,30 +105,16 @@ class _ModeModel(FollowedMode):
     def evaluate(self, values: Mapping[str, float]) -> Predicted:
         """As the base says."""
         names, found = self.looked_at({**values, **self._run.conditions}, self._run.x)
-        return self._predicted(found, names)
-
-    def _predicted(self, found: ModePoints, names: Sequence[str]) -> Predicted:
         both = {
             "frequency": (found.frequency_hz, found.by_frequency),
             "damping_ratio": (found.damping_ratio, found.by_damping),
         }
-        asked = [both[name] for name in self._run.data]
-        values = np.concatenate([one for one, _ in asked])
-        slopes = np.vstack([by for _, by in asked])
-        return Predicted(
-            values=values, slopes=slopes, reached=np.isfinite(values) & np.isfinite(slopes).all(axis=1),
-            states={name: found.states[:, c] for c, name in enumerate(names)},
-        )  # fmt: skip
+        states = {name: found.states[:, c] for c, name in enumerate(names)}
+        return Predicted.of([both[name] for name in self._run.data], states)
 
 
 def read_mode(scene: Scene, table: Table) -> MeasuredRows:
-    """Read the table of one run.
-
-    Raises
-    ------
-    DataError
-        What is wrong, with its line.
-    """
+    """As `DataKind.read` says."""
     table.need(2, "points")
     check_sign(table, "modal_amplitude", positive=True)
     check_monotone(table, "modal_amplitude")

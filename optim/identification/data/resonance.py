@@ -100,14 +100,11 @@ class _ResonanceModel(RunModel):
             for name, (column, slopes) in columns.items():
                 column[i], slopes[i] = told[name]
             states[i] = seen.states
-        predicted = np.concatenate([column for column, _ in columns.values()])
-        slopes = np.vstack([slopes for _, slopes in columns.values()])
         if AMPLITUDE in self._paths:  # the level stands in its place
-            slopes[:, self._paths.index(AMPLITUDE)] = 0.0
-        return Predicted(
-            values=predicted, slopes=slopes, reached=np.isfinite(predicted) & np.isfinite(slopes).all(axis=1),
-            states={each.name: states[:, c] for c, each in enumerate(here.contacts)},
-        )  # fmt: skip
+            for _, slopes in columns.values():
+                slopes[:, self._paths.index(AMPLITUDE)] = 0.0
+        codes = {each.name: states[:, c] for c, each in enumerate(here.contacts)}
+        return Predicted.of(list(columns.values()), codes)
 
     def _at(self, scene: Scene, i: int) -> tuple[float, Observed] | None:
         """Return frequency and response in phase resonance at level i; None where there is none."""
@@ -155,13 +152,7 @@ class _ResonanceModel(RunModel):
 
 
 def read_resonance(scene: Scene, table: Table) -> MeasuredRows:
-    """Read the table of one run.
-
-    Raises
-    ------
-    DataError
-        What is wrong, with its line.
-    """
+    """As `DataKind.read` says."""
     table.need(1, "levels")
     check_level(table)
     at, data, sd = columns_of(table, ("level",), _MEASURED)

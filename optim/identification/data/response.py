@@ -248,18 +248,22 @@ class ResponseRun(MeasuredRows):
 
 
 def read_response(scene: Scene, table: Table) -> MeasuredRows:
-    """Read the table of one run.
-
-    Raises
-    ------
-    DataError
-        What is wrong, with its line.
-    """
+    """As `DataKind.read` says."""
     table.need(2, "points")
     check_sign(table, "frequency", positive=True)
     check_monotone(table, "frequency")
     frequencies = table.columns["frequency"]
-    _check_band(scene, table)
+    # Frequencies far from those the scene is looked at over are of another unit, most likely.
+    low, high = scene.observe.band
+    frequencies = table.columns["frequency"]
+    far = np.flatnonzero((frequencies < low / _FAR) | (frequencies > high * _FAR))
+    if far.size:
+        wanted = (
+            f"must be near the scene's band, {low:g} to {high:g} Hz: give the unit in the head of the "
+            f"column, "
+            "`frequency [kHz]`, `[rad/s]` or `[1/min]`"
+        )
+        raise table.error(int(far[0]), "frequency", wanted)
     quantity, column, data = _data(table)
     here = scene.with_values(dict(table.conditions))
     unit = table.units.get(column)
@@ -299,20 +303,6 @@ def _check_units(table: Table, column: str) -> None:
         ):
             wanted = f"must be in a unit as that of `{column}`: both displacements, or both by a force"
             raise table.refusal(other, wanted, other)
-
-
-def _check_band(scene: Scene, table: Table) -> None:
-    """Refuse frequencies far from those the scene is looked at over: another unit, most likely."""
-    low, high = scene.observe.band
-    frequencies = table.columns["frequency"]
-    far = np.flatnonzero((frequencies < low / _FAR) | (frequencies > high * _FAR))
-    if far.size:
-        wanted = (
-            f"must be near the scene's band, {low:g} to {high:g} Hz: give the unit in the head of the "
-            f"column, "
-            "`frequency [kHz]`, `[rad/s]` or `[1/min]`"
-        )
-        raise table.error(int(far[0]), "frequency", wanted)
 
 
 def _data(table: Table) -> tuple[Quantity, str, Real | Complex]:

@@ -124,13 +124,9 @@ def read_head(
         elif key == KIND_WORD or key in known_words() or key in besides:
             words[key] = value
         elif "." in key:
-            raise _unknown_path(source, number, key, paths)
+            wanted = f"must be a parameter path of the scene{nearest(key, sorted(paths))}"
+            raise DataError(source, key, wanted, line=number)
     return Head(conditions=conditions, words=words)
-
-
-def _unknown_path(source: str, line: int | None, key: str, paths: frozenset[str]) -> DataError:
-    known = sorted(paths)
-    return DataError(source, key, f"must be a parameter path of the scene{nearest(key, known)}", line=line)
 
 
 def _condition(source: str, number: int | None, key: str, text: str) -> float:

@@ -262,29 +262,6 @@ def _binary(
 
 def _table(one: _Function, paths: frozenset[str]) -> Table:
     """Return a function as a table, if it is a response in one DOF."""
-    _check_kind(one)
-    motion = _motion(one)
-    hertz = unit_of(Dimension.FREQUENCY, one.abscissa.unit or None)
-    if hertz is None:
-        raise one.refusal(one.abscissa.unit, wanted_unit(Dimension.FREQUENCY, ""), "abscissa")
-    data = one.data * motion.factor
-    if np.iscomplexobj(data):
-        data = (
-            data * np.sign(one.direction or 1) * (np.sign(one.reference[1] or 1) if motion.per_force else 1.0)
-        )
-    unit = ("m", "m/s", "m/s2")[motion.order] + ("/N" if motion.per_force else "")
-    head = read_head(one.source, one.titles, paths)
-    heads, columns = complex_apart(
-        one.source, ["frequency", f"amplitude [{unit}]"], [one.frequency * hertz.factor, data]
-    )
-    return table_of(one.source, heads, columns, head, paths)
-
-
-_RIGHT = "must be a frequency response function (4), or a spectrum (12) whose unit says pk, rms or pk-pk"
-
-
-def _check_kind(one: _Function) -> None:
-    """Refuse what is no translation over the frequency, by a force or by nothing."""
     if one.function not in (_GENERAL, _RESPONSE, _SPECTRUM):
         raise one.refusal(f"{_name(one.function)} ({one.function})", _RIGHT, "function")
     if one.abscissa.kind != _FREQUENCY:
@@ -303,6 +280,24 @@ def _check_kind(one: _Function) -> None:
         raise one.refusal(_axis(below), wanted, "denominator")
     if below.kind == _FORCE and abs(one.reference[1]) > _LAST_TRANSLATION:
         raise one.refusal(_along(one.reference[1]), "must be a force, not a moment", "reference")
+    motion = _motion(one)
+    hertz = unit_of(Dimension.FREQUENCY, one.abscissa.unit or None)
+    if hertz is None:
+        raise one.refusal(one.abscissa.unit, wanted_unit(Dimension.FREQUENCY, ""), "abscissa")
+    data = one.data * motion.factor
+    if np.iscomplexobj(data):
+        data = (
+            data * np.sign(one.direction or 1) * (np.sign(one.reference[1] or 1) if motion.per_force else 1.0)
+        )
+    unit = ("m", "m/s", "m/s2")[motion.order] + ("/N" if motion.per_force else "")
+    head = read_head(one.source, one.titles, paths)
+    heads, columns = complex_apart(
+        one.source, ["frequency", f"amplitude [{unit}]"], [one.frequency * hertz.factor, data]
+    )
+    return table_of(one.source, heads, columns, head, paths)
+
+
+_RIGHT = "must be a frequency response function (4), or a spectrum (12) whose unit says pk, rms or pk-pk"
 
 
 def _axis(axis: _Axis) -> str:

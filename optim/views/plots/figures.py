@@ -161,8 +161,34 @@ def pareto_figure(answer: Json, *, ax: Into = None) -> Figure:
     unit = measured.unit_for(min(point["peak"] for point in points))
     with style.styled():
         page, (front, risk) = style.figure(9.2, 3.7, columns=2, into=ax)
-        _draw_front(front, answer, unit)
-        _draw_risk(risk, points, unit)
+        points = answer["points"]
+        band = np.array([point["band_hz"] for point in points])
+        peak = np.array([point["peak"] for point in points]) * unit.per_metre
+        wide, tall = float(np.ptp(band)) or 1.0, float(np.ptp(peak)) or 1.0
+        for point, x, y in zip(points, band, peak, strict=True):
+            if point["slope"] is None:
+                continue
+            slope = point["slope"] * unit.per_metre
+            reach = _TANGENT / np.hypot(1.0 / wide, slope / tall)
+            front.plot(
+                [x - reach, x + reach], [y - slope * reach, y + slope * reach], color=style.SKY,
+                linewidth=4.0, alpha=0.55,
+            )  # fmt: skip
+        front.plot(band, peak, color=style.BLUE, marker="o", markersize=4.5)
+        for point in answer["dominated"]:
+            x, y = point["band_hz"], point["peak"] * unit.per_metre
+            front.plot([x], [y], color=style.GREY, marker="x", markersize=4.5)
+        knee = answer["knee"]
+        if knee is not None:
+            _name(front, points[knee], unit)
+        front.margins(x=0.1, y=0.12)
+        # The intervals of the band at the height of each point's peak, and where the peak is.
+        for point in points:
+            y = point["peak"] * unit.per_metre
+            for low, high in point["intervals"]:
+                risk.plot([low, high], [y, y], color=style.SKY, linewidth=3.2, solid_capstyle="butt")
+            risk.plot([point["at"]], [y], color=style.BLUE, marker="o", markersize=4.0, linestyle="none")
+        risk.margins(x=0.06, y=0.12)
         named = measured.label("highest peak", unit)
         style.label(front, "resonance band [Hz]", named)
         style.label(risk, "frequency [Hz]", named)
@@ -170,32 +196,6 @@ def pareto_figure(answer: Json, *, ax: Into = None) -> Figure:
         front.set_title(f"{answer['scene']}, band above {limit}")
         risk.set_title("frequencies at risk")
     return page
-
-
-def _draw_front(axes: Axes, answer: Json, unit: LengthUnit) -> None:
-    """Draw the points, the slope at each, the dominated designs and the knee."""
-    points = answer["points"]
-    band = np.array([point["band_hz"] for point in points])
-    peak = np.array([point["peak"] for point in points]) * unit.per_metre
-    wide, tall = float(np.ptp(band)) or 1.0, float(np.ptp(peak)) or 1.0
-    for point, x, y in zip(points, band, peak, strict=True):
-        if point["slope"] is None:
-            continue
-        slope = point["slope"] * unit.per_metre
-        reach = _TANGENT / np.hypot(1.0 / wide, slope / tall)
-        axes.plot(
-            [x - reach, x + reach], [y - slope * reach, y + slope * reach], color=style.SKY, linewidth=4.0,
-            alpha=0.55,
-        )  # fmt: skip
-    axes.plot(band, peak, color=style.BLUE, marker="o", markersize=4.5)
-    for point in answer["dominated"]:
-        axes.plot(
-            [point["band_hz"]], [point["peak"] * unit.per_metre], color=style.GREY, marker="x", markersize=4.5
-        )
-    knee = answer["knee"]
-    if knee is not None:
-        _name(axes, points[knee], unit)
-    axes.margins(x=0.1, y=0.12)
 
 
 def _name(axes: Axes, point: Json, unit: LengthUnit) -> None:
@@ -210,16 +210,6 @@ def _name(axes: Axes, point: Json, unit: LengthUnit) -> None:
         "knee: " + "\n".join(lines), (x, y), xytext=(10, 14), textcoords="offset points", va="bottom",
         color=style.VERMILION, linespacing=1.35,
     )  # fmt: skip
-
-
-def _draw_risk(axes: Axes, points: Sequence[Json], unit: LengthUnit) -> None:
-    """Draw the intervals of the band at the height of each point's peak, and where the peak is."""
-    for point in points:
-        y = point["peak"] * unit.per_metre
-        for low, high in point["intervals"]:
-            axes.plot([low, high], [y, y], color=style.SKY, linewidth=3.2, solid_capstyle="butt")
-        axes.plot([point["at"]], [y], color=style.BLUE, marker="o", markersize=4.0, linestyle="none")
-    axes.margins(x=0.06, y=0.12)
 
 
 _BAND = 1.96
@@ -287,7 +277,9 @@ def _draw(axes: Axes, run: Json, colour: str, scale: float, order: np.ndarray, *
     x = np.asarray(run["x"])[order]
     data, fit, sd = (_numbers(run[key])[order] * scale for key in ("data", "fit", "fit_sd"))
     axes.plot(x, data, marker=markers, markersize=2.8, linestyle="none", color=colour, alpha=0.55)
-    axes.plot(x, fit, color=colour, linewidth=1.2, label=_run_name(run))
+    conditions: Mapping[str, float] = run["conditions"]
+    told = [style.quantity(path, value, 4) for path, value in conditions.items()]
+    axes.plot(x, fit, color=colour, linewidth=1.2, label=", ".join(told) or str(run["source"]))
     if run["kind"] != LOOP:
         low = np.maximum(fit - _BAND * sd, 1e-3 * fit)
         axes.fill_between(x, low, fit + _BAND * sd, color=colour, alpha=0.25, linewidth=0.0)
@@ -295,12 +287,6 @@ def _draw(axes: Axes, run: Json, colour: str, scale: float, order: np.ndarray, *
 
 def _numbers(values: Sequence[float | None]) -> Real:
     return np.array([math.nan if value is None else value for value in values], dtype=np.float64)
-
-
-def _run_name(run: Json) -> str:
-    conditions: Mapping[str, float] = run["conditions"]
-    told = [style.quantity(path, value, 4) for path, value in conditions.items()]
-    return ", ".join(told) or str(run["source"])
 
 
 def _legend(axes: Axes, runs: Sequence[Json]) -> None:

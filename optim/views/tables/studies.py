@@ -27,7 +27,15 @@ def campbell(found: Mapping[str, Any]) -> Iterator[Block]:
     yield ResultTable(title, ("order", "crossing [rpm]", "peak [Hz]", "amplitude", ""), rows)
     pairs = [*Measured.of_result(found).pairs]
     for order in found["orders"]:
-        pairs.append((f"order {order['order']}", _running(order)))
+        # What the order does at running speeds.
+        highest = order["highest_running"]
+        text = "no response at running speeds"
+        if highest is not None:
+            text = f"at most {_amplitude(highest)}, at {highest['speed_rpm']:.6g} rpm"
+        over = ", ".join(f"{low:.6g} to {high:.6g}" for low, high in order["exceeded_running_rpm"])
+        if over:
+            text += f"; above {units.length(order['limit'])} from {over} rpm"
+        pairs.append((f"order {order['order']}", text))
         for what, name in (("stuck_hz", "all stuck"), ("open_hz", "all open")):
             pairs.append((f"  {name}", ", ".join(f"{value:.5g}" for value in order[what]) + " Hz"))
     pairs += known_pairs(found) if "measure" in found else _open_ends(found["orders"])
@@ -52,18 +60,6 @@ def _amplitude(crossing: Mapping[str, Any]) -> str:
         return units.length(height) + (" ± not known" if "error_estimate" in crossing else "")
     unit = units.length_unit(height)
     return f"{units.number(height * unit.per_metre)} ± {units.number(error * unit.per_metre, 2)} {unit.name}"
-
-
-def _running(order: Mapping[str, Any]) -> str:
-    """What one order does at running speeds, in words."""
-    highest = order["highest_running"]
-    text = "no response at running speeds"
-    if highest is not None:
-        text = f"at most {_amplitude(highest)}, at {highest['speed_rpm']:.6g} rpm"
-    over = ", ".join(f"{low:.6g} to {high:.6g}" for low, high in order["exceeded_running_rpm"])
-    if over:
-        text += f"; above {units.length(order['limit'])} from {over} rpm"
-    return text
 
 
 def shares(found: Mapping[str, Any]) -> Iterator[Block]:

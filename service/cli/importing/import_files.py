@@ -91,7 +91,7 @@ def read_sources(found: Sources, deck: Path | None) -> MatrixSet | None:
     from solver.matrices.load_set import PART, in_global, in_si, read_set
     from solver.matrices.matrix_files import MatrixFileError
     from solver.matrices.readers.numbers_in_text import FormatError
-    from solver.matrices.sectors.decks import read_deck
+    from solver.matrices.sectors.loading import read_deck
 
     if "modes" in found.roles:
         return None

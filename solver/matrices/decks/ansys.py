@@ -74,7 +74,24 @@ class AnsysDeck:
             elif name == "CSYS":
                 self._active = int(parts[1] or 0) if len(parts) > 1 else 0
             elif name == "LOCA":
-                self._local(parts)
+                # LOCAL,KCN,KCS,x,y,z,angles,PAR1,PAR2, which makes it the active one; or by CDWRITE.
+                written = parts[1].startswith("R")
+                number, kind = (
+                    (int(text) for text in parts[3:5]) if written else (int(text or 0) for text in parts[1:3])
+                )
+                numbers = [real(text) for text in parts[5:] if written] or [real(text) for text in parts[3:]]
+                numbers += [0.0] * (8 - len(numbers))
+                before = self._known.get(number, GLOBAL)
+                origin, angles = np.array(numbers[:3]), numbers[3:6]
+                if written and parts[2] == "ANG":
+                    origin, angles = before.origin, numbers[:3]
+                if kind not in _KINDS or any(ratio not in (0.0, 1.0) for ratio in numbers[6:8]):
+                    self._known.pop(number, None)
+                else:
+                    self._known[number] = CoordinateSystem(
+                        _KINDS[kind], origin, ansys_axes(angles[0], angles[1], angles[2])
+                    )
+                self._active = self._active if written else number
             elif name in ("CLOC", "CS", "CSKP", "CSWP"):
                 self._known.pop(int(parts[1]), None)  # another system under this number from here on
                 self._active = int(parts[1])
@@ -106,26 +123,6 @@ class AnsysDeck:
                 "rectangular and circular ones of LOCAL"
             )
         return self._known[number]
-
-    def _local(self, parts: list[str]) -> None:
-        """LOCAL,KCN,KCS,x,y,z,angles,PAR1,PAR2, which makes it the active one; or as CDWRITE writes it."""
-        written = parts[1].startswith("R")
-        number, kind = (
-            (int(text) for text in parts[3:5]) if written else (int(text or 0) for text in parts[1:3])
-        )
-        numbers = [real(text) for text in parts[5:] if written] or [real(text) for text in parts[3:]]
-        numbers += [0.0] * (8 - len(numbers))
-        before = self._known.get(number, GLOBAL)
-        origin, angles = np.array(numbers[:3]), numbers[3:6]
-        if written and parts[2] == "ANG":
-            origin, angles = before.origin, numbers[:3]
-        if kind not in _KINDS or any(ratio not in (0.0, 1.0) for ratio in numbers[6:8]):
-            self._known.pop(number, None)
-        else:
-            self._known[number] = CoordinateSystem(
-                _KINDS[kind], origin, ansys_axes(angles[0], angles[1], angles[2])
-            )
-        self._active = self._active if written else number
 
     def _turn(self, node: int, angles: list[float]) -> None:
         key = tuple(angles)

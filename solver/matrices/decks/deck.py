@@ -84,7 +84,11 @@ def drawn_edges(
         raise ValueError(f"an element has the node {missing[0]}, which has no place in the deck")
     points = np.array([places[int(node)] for node in known])
     rows = np.where(faces >= 0, np.searchsorted(known, faces), -1)
-    normals = _normals(points, rows)
+    # Unit normals of faces, (n, 3), by the diagonals of a quadrangle; 0 of a face without area.
+    fourth = np.where(rows[:, 3] < 0, rows[:, 0], rows[:, 3])
+    across = np.cross(points[rows[:, 2]] - points[rows[:, 0]], points[fourth] - points[rows[:, 1]])
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    normals = np.asarray(np.divide(across, length, out=np.zeros_like(across), where=length > 0.0))
     pairs, owners = [], []
     for i in range(4):
         ahead = np.where((i == 3) | (rows[:, (i + 1) % 4] < 0), rows[:, 0], rows[:, (i + 1) % 4])
@@ -116,14 +120,6 @@ def _surface(blocks: Sequence[tuple[ElementShape, Integer]]) -> Integer:
     faces = np.concatenate(found)
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     return np.asarray(faces[first[count == 1]], np.int64)
-
-
-def _normals(points: Real, rows: Integer) -> Real:
-    """Unit normals of faces, (n, 3), by the diagonals of a quadrangle; 0 of a face without area."""
-    fourth = np.where(rows[:, 3] < 0, rows[:, 0], rows[:, 3])
-    across = np.cross(points[rows[:, 2]] - points[rows[:, 0]], points[fourth] - points[rows[:, 1]])
-    length = np.linalg.norm(across, axis=1, keepdims=True)
-    return np.asarray(np.divide(across, length, out=np.zeros_like(across), where=length > 0.0))
 
 
 def _bent(which: Integer, normals: Real, count: int) -> NDArray[np.bool_]:

@@ -77,20 +77,7 @@ def read_abaqus(path: Path) -> Labelled:
                 f"line {number}: {line.strip()[:60]!r} belongs to matrices of elements or substructures: "
                 "write the assembled ones by *MATRIX GENERATE and *MATRIX OUTPUT, FORMAT=MATRIX INPUT"
             )
-    _other_format(lines)
-    data = table(lines, (5, 3), _LINE, _COMMENT)
-    if data.shape[1] == 3:
-        _refuse_counts(data)
-        return _coordinate(data, lines, _COMMENT)
-    rows, columns, labels = _places(data, lines)
-    size = len(labels)
-    matrix = mirrored(rows, columns, data[:, 4], size)
-    stiff = (rows == columns) & (data[:, 4] >= _HELD)
-    return Labelled(matrix=matrix, labels=labels, held=frozenset(labels[row] for row in rows[stiff]))
-
-
-def _other_format(lines: list[str]) -> None:
-    """Refuse what another program wrote, by its name."""
+    # What another program wrote is refused by its name.
     if lines and lines[0].lstrip().startswith("%"):
         raise FormatError(
             "line 1 is a comment of MatrixMarket, whose first line must be `%%MatrixMarket matrix coordinate "
@@ -100,15 +87,27 @@ def _other_format(lines: list[str]) -> None:
         raise FormatError(
             "line 3 is that of a Harwell-Boeing matrix (HBMAT of Ansys): let its name end in .matrix or .rsa"
         )
-
-
-def _refuse_counts(data: NDArray[np.float64]) -> None:
-    """Refuse a first line that counts what follows."""
-    if data[0, 0] == data[0, 1] == data[:, :2].max() and len(data) > 1 and data[0, 2] == len(data) - 1:
-        raise FormatError(
-            "line 1 counts rows, columns and entries, as in MatrixMarket: its first line, `%%MatrixMarket "
-            "matrix coordinate real symmetric` (or `general`), is missing"
-        )
+    data = table(lines, (5, 3), _LINE, _COMMENT)
+    if data.shape[1] == 3:
+        if data[0, 0] == data[0, 1] == data[:, :2].max() and len(data) > 1 and data[0, 2] == len(data) - 1:
+            raise FormatError(
+                "line 1 counts rows, columns and entries, as in MatrixMarket: its first line, "
+                "`%%MatrixMarket matrix coordinate real symmetric` (or `general`), is missing"
+            )
+        return _coordinate(data, lines, _COMMENT)
+    # The labels are those of the file, sorted by node and DOF.
+    nodes = [whole_numbers(data[:, i], -LARGEST, "node", lines, _COMMENT) for i in (0, 2)]
+    dofs = [whole_numbers(data[:, i], 0, "DOF", lines, _COMMENT) for i in (1, 3)]
+    width = int(max(dofs[0].max(), dofs[1].max())) + 1
+    keys = [node * width + dof for node, dof in zip(nodes, dofs, strict=True)]
+    known, places = np.unique(np.concatenate(keys), return_inverse=True)
+    labels = tuple(Label(int(key // width), component(str(key % width))) for key in known)
+    rows, columns = places[: keys[0].size], places[keys[0].size :]
+    rows, columns, labels = rows.astype(np.int64), columns.astype(np.int64), labels
+    size = len(labels)
+    matrix = mirrored(rows, columns, data[:, 4], size)
+    stiff = (rows == columns) & (data[:, 4] >= _HELD)
+    return Labelled(matrix=matrix, labels=labels, held=frozenset(labels[row] for row in rows[stiff]))
 
 
 def _coordinate(data: NDArray[np.float64], lines: list[str], comment: str = "") -> Labelled:
@@ -119,20 +118,6 @@ def _coordinate(data: NDArray[np.float64], lines: list[str], comment: str = "") 
     if size > MOST_ROWS:
         raise FormatError(f"a matrix may have {MOST_ROWS} rows, got {size}")
     return Labelled(matrix=mirrored(rows, columns, data[:, 2], size), sized=False)
-
-
-def _places(
-    data: NDArray[np.float64], lines: list[str]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], tuple[Label, ...]]:
-    """Rows and columns of the entries, and the labels: those of the file, sorted by node and DOF."""
-    nodes = [whole_numbers(data[:, i], -LARGEST, "node", lines, _COMMENT) for i in (0, 2)]
-    dofs = [whole_numbers(data[:, i], 0, "DOF", lines, _COMMENT) for i in (1, 3)]
-    width = int(max(dofs[0].max(), dofs[1].max())) + 1
-    keys = [node * width + dof for node, dof in zip(nodes, dofs, strict=True)]
-    known, places = np.unique(np.concatenate(keys), return_inverse=True)
-    labels = tuple(Label(int(key // width), component(str(key % width))) for key in known)
-    rows, columns = places[: keys[0].size], places[keys[0].size :]
-    return rows.astype(np.int64), columns.astype(np.int64), labels
 
 
 def _calculix(path: Path, _key: str) -> Labelled:

@@ -89,7 +89,19 @@ def read_dmig(path: Path) -> dict[str, Labelled]:
             raise FormatError(f"line {line}: a column of {name!r} stands before its heading")
         entries = found[name]
         if entries is not None:
-            _column(entries, fields, line)
+            column = _label(fields[2], fields[3], line)
+            if not any(fields[5:]):
+                raise FormatError(f"line {line}: the column {column} has no entries")
+            # A triple takes four fields: node, component, value, and the imaginary part, empty of real ones.
+            for at in range(5, len(fields), 4):
+                node, part, value, imaginary = (*fields[at : at + 4], "", "", "")[:4]
+                if not any((node, part, value)):
+                    continue
+                if imaginary and _number(imaginary, line) != 0.0:
+                    raise FormatError(f"line {line}: a real matrix has no imaginary part, got {imaginary!r}")
+                entries.rows.append(_label(node, part, line))
+                entries.columns.append(column)
+                entries.values.append(_number(value, line))
     kept = {name: entries for name, entries in found.items() if entries is not None}
     if not kept:
         raise FormatError("; ".join(others[:3]) or "line 1: the file holds no DMIG entry")
@@ -107,22 +119,6 @@ def _passed_over(fields: list[str]) -> str:
     if kind not in ("1", "2"):
         return f"must be of the type 1 or 2 (real), got {kind!r}"
     return ""
-
-
-def _column(entries: _Entries, fields: list[str], line: int) -> None:
-    column = _label(fields[2], fields[3], line)
-    if not any(fields[5:]):
-        raise FormatError(f"line {line}: the column {column} has no entries")
-    # A triple takes four fields: node, component, value, and the imaginary part that real ones leave empty.
-    for at in range(5, len(fields), 4):
-        node, part, value, imaginary = (*fields[at : at + 4], "", "", "")[:4]
-        if not any((node, part, value)):
-            continue
-        if imaginary and _number(imaginary, line) != 0.0:
-            raise FormatError(f"line {line}: a real matrix has no imaginary part, got {imaginary!r}")
-        entries.rows.append(_label(node, part, line))
-        entries.columns.append(column)
-        entries.values.append(_number(value, line))
 
 
 def _label(node: str, part: str, line: int) -> Label:
@@ -194,7 +190,22 @@ class _Bulk:
             if number in self.open:
                 raise FormatError(f"coordinate system {number} is defined by itself")
             self.open.append(number)
-            self.known[number] = self._made(number)
+            # By three points: the origin, one on z, one on the side of x in the plane of x and z.
+            entry = self.cords[number]
+            found = _CORD.fullmatch(entry.name)
+            if found is None:
+                raise FormatError(f"line {entry.line}: {entry.name} must be one of CORD1R, CORD1C … CORD2S")
+            if found[1] == "1":
+                first = 0 if entry.whole(0) == number else 4
+                points = np.array([self.place(entry.whole(first + i)) for i in (1, 2, 3)])
+            else:
+                given = np.array([real(entry.field(i)) for i in range(2, 11)]).reshape(3, 3)
+                points = self.system(entry.whole(1)).places(given)
+            try:
+                axes = axes_by(2, points[1] - points[0], 0, points[2] - points[0])
+            except ValueError as error:
+                raise FormatError(f"coordinate system {number} is none: {error}") from error
+            self.known[number] = CoordinateSystem(_KINDS[found[2]], points[0], axes)
             self.open.pop()
         return self.known[number]
 
@@ -203,24 +214,6 @@ class _Bulk:
             raise FormatError(f"there is no GRID {node}, by which a coordinate system is defined")
         cp, numbers, _ = self.grids[node]
         return np.asarray(self.system(cp).places(numbers[None, :])[0])
-
-    def _made(self, number: int) -> CoordinateSystem:
-        """By three points: the origin, one on z, one on the side of x in the plane of x and z."""
-        entry = self.cords[number]
-        found = _CORD.fullmatch(entry.name)
-        if found is None:
-            raise FormatError(f"line {entry.line}: {entry.name} must be one of CORD1R, CORD1C … CORD2S")
-        if found[1] == "1":
-            first = 0 if entry.whole(0) == number else 4
-            points = np.array([self.place(entry.whole(first + i)) for i in (1, 2, 3)])
-        else:
-            given = np.array([real(entry.field(i)) for i in range(2, 11)]).reshape(3, 3)
-            points = self.system(entry.whole(1)).places(given)
-        try:
-            axes = axes_by(2, points[1] - points[0], 0, points[2] - points[0])
-        except ValueError as error:
-            raise FormatError(f"coordinate system {number} is none: {error}") from error
-        return CoordinateSystem(_KINDS[found[2]], points[0], axes)
 
 
 def read_nastran(file: DeckFile, deck: Deck) -> None:

@@ -41,30 +41,34 @@ def _archive_names(path: Path) -> list[str]:
 def _archive_matrix(path: Path, key: str) -> Any:
     with _archive(path) as arrays:
         if {"format", "shape", "data"} <= set(arrays.files):
-            return _sparse(arrays)
+            # A matrix that scipy.sparse.save_npz wrote, its indices checked: SciPy trusts the file.
+            kind, shape, data = (
+                arrays["format"].item(),
+                tuple(int(n) for n in arrays["shape"]),
+                arrays["data"],
+            )
+            kind = kind.decode("ascii") if isinstance(kind, bytes) else str(kind)
+            if kind == "coo":
+                places = (
+                    arrays["coords"] if "coords" in arrays.files else np.array([arrays["row"], arrays["col"]])
+                )
+                return coo_array((data, tuple(places)), shape=shape)
+            if kind == "dia":
+                return dia_array((data, arrays["offsets"]), shape=shape).tocoo()
+            made = {"csr": csr_array, "csc": csc_array, "bsr": bsr_array}.get(kind)
+            if made is None:
+                raise MatrixFileError(
+                    f"a sparse matrix of the format {kind!r} cannot be read: save it as csr"
+                )
+            matrix = made((data, arrays["indices"], arrays["indptr"]), shape=shape)
+            matrix.check_format(full_check=True)
+            return matrix.tocoo()
         return arrays[wanted(arrays.files, key, path)]
 
 
 def _archive_modes(path: Path) -> dict[str, Any]:
     with _archive(path) as archive:
         return {name: archive[name] for name in MODES_KEYS if name in archive.files}
-
-
-def _sparse(arrays: Any) -> coo_array:
-    """A matrix that scipy.sparse.save_npz wrote, its indices checked: SciPy trusts the file."""
-    kind, shape, data = arrays["format"].item(), tuple(int(n) for n in arrays["shape"]), arrays["data"]
-    kind = kind.decode("ascii") if isinstance(kind, bytes) else str(kind)
-    if kind == "coo":
-        places = arrays["coords"] if "coords" in arrays.files else np.array([arrays["row"], arrays["col"]])
-        return coo_array((data, tuple(places)), shape=shape)
-    if kind == "dia":
-        return dia_array((data, arrays["offsets"]), shape=shape).tocoo()
-    made = {"csr": csr_array, "csc": csc_array, "bsr": bsr_array}.get(kind)
-    if made is None:
-        raise MatrixFileError(f"a sparse matrix of the format {kind!r} cannot be read: save it as csr")
-    matrix = made((data, arrays["indices"], arrays["indptr"]), shape=shape)
-    matrix.check_format(full_check=True)
-    return matrix.tocoo()
 
 
 def _matlab(path: Path) -> dict[str, Any]:

@@ -89,7 +89,18 @@ def read_harwell_boeing(path: Path) -> csc_array:
     indices = _integers(lines, cursor, header.index_lines, header.indices, header.entries, "row index")
     cursor += header.index_lines
     values = _reals(lines, cursor, header.value_lines, header.values, header.entries)
-    _check_structure(header, pointers, indices)
+    first = header.first_line
+    falls = np.flatnonzero(np.diff(pointers) < 0)
+    if pointers[0] != 1 or pointers[-1] != header.entries + 1 or falls.size:
+        at = 0 if pointers[0] != 1 else int(falls[0]) + 1 if falls.size else pointers.size - 1
+        raise FormatError(
+            f"line {first + at // header.pointers.count + 1}: "
+            f"pointers must rise from 1 to {header.entries + 1}, got {pointers[at]} for column {at + 1}"
+        )
+    bad = np.flatnonzero((indices < 1) | (indices > header.rows))
+    if bad.size:
+        line = first + header.pointer_lines + int(bad[0]) // header.indices.count + 1
+        raise FormatError(f"line {line}: a row index must be from 1 to {header.rows}, got {indices[bad[0]]}")
     shape = (header.rows, header.columns)
     stored = csc_array((values, indices - 1, pointers - 1), shape=shape)
     if header.kind[1] not in "SZ":
@@ -145,20 +156,16 @@ def _integer_format(text: str) -> _Format:
     return _Format(count=int(found[1] or 1), width=int(found[2]))
 
 
-def _real_format(text: str) -> _Format:
+def _value_format(text: str, kind: str) -> _Format:
+    """The format of the values: matrices of whole numbers (I) may be written in a format of these."""
+    if kind[0] == "I" and _INTEGERS.fullmatch(text.strip().upper()):
+        return _integer_format(text)
     found = _REALS.fullmatch(text.strip().upper())
     if not found or not int(found[3]) or found[2] == "0":
         raise FormatError(f"line 4: {text.strip()!r} is not a format of real numbers such as (5E16.8)")
     return _Format(
         count=int(found[2] or 1), width=int(found[3]), decimals=int(found[4]), power=int(found[1] or 0)
     )
-
-
-def _value_format(text: str, kind: str) -> _Format:
-    """The format of the values: matrices of whole numbers (I) may be written in a format of these."""
-    if kind[0] == "I" and _INTEGERS.fullmatch(text.strip().upper()):
-        return _integer_format(text)
-    return _real_format(text)
 
 
 def _whole(text: str, line: int, column: int, what: str) -> int:
@@ -288,22 +295,6 @@ def _real(text: str, form: _Format) -> float:
         return float(f"{found[1]}E{int(power) - form.decimals}")
     value = float(mantissa)
     return value / 10.0**form.power if form.power else value
-
-
-def _check_structure(header: _Header, pointers: NDArray[np.int64], indices: NDArray[np.int64]) -> None:
-    """Pointers must rise from 1 to one more than the entries, indices lie within the rows."""
-    first = header.first_line
-    falls = np.flatnonzero(np.diff(pointers) < 0)
-    if pointers[0] != 1 or pointers[-1] != header.entries + 1 or falls.size:
-        at = 0 if pointers[0] != 1 else int(falls[0]) + 1 if falls.size else pointers.size - 1
-        raise FormatError(
-            f"line {first + at // header.pointers.count + 1}: "
-            f"pointers must rise from 1 to {header.entries + 1}, got {pointers[at]} for column {at + 1}"
-        )
-    bad = np.flatnonzero((indices < 1) | (indices > header.rows))
-    if bad.size:
-        line = first + header.pointer_lines + int(bad[0]) // header.indices.count + 1
-        raise FormatError(f"line {line}: a row index must be from 1 to {header.rows}, got {indices[bad[0]]}")
 
 
 def _mapping(path: Path) -> tuple[Label, ...]:

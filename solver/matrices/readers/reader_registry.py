@@ -77,7 +77,7 @@ class Reader:
     ] = None
     nodes: Annotated[
         Callable[[Path], Any] | None,
-        "Reads positions and sets of nodes, a `solver.matrices.sectors.decks.Deck`.",
+        "Reads positions and sets of nodes, a `solver.matrices.sectors.loading.Deck`.",
     ] = None
     global_rows: Annotated[
         bool, "Whether rows are along the global axes whatever frames a deck gives to nodes, as in CalculiX."
@@ -119,7 +119,7 @@ SHIPPED = (
     "solver.matrices.decks.keywords",
     "solver.matrices.readers.output4",
     "solver.matrices.decks.nastran",
-    "solver.matrices.sectors.decks",
+    "solver.matrices.sectors.loading",
 )
 _START = 200
 READERS: Kinds[Reader] = Kinds(Reader, "reader", lambda reader: (reader.name,), SHIPPED, "READERS")

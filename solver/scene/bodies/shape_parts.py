@@ -183,7 +183,16 @@ def shape_parameter(scene: Scene, path: str) -> SceneParameter | None:
         in_steps=key == POINTS,
     )  # fmt: skip
     if key in shape.FACE:
-        return _of_face(scene, shape, key, whole)
+        # Each contact of a face has its share of its number.
+        parts = shape.shares if key in shape.SHARED else (1.0,) * len(shape.shares)
+        shares = {contact.name: part for contact, part in zip(contacts_of(shape), parts, strict=True)}
+        mine = {i: shares[contact.name] for i, contact in enumerate(scene.contacts) if contact.name in shares}
+        quantities = tuple(scene.contacts[i].PARAMETERS[key] for i in mine)
+        first = quantities[0]
+        return replace(
+            whole, acts_on=ActsOn.CONTACTS, contacts=mine, quantities=quantities, unit=first.unit,
+            least=first.least,
+        )  # fmt: skip
     if key in shape.GEOMETRY:
         return replace(whole, moves_contacts=True, slope=lambda: Slope(motions=_moved(scene, shape, key)))
     body = body_parameter(scene, path)
@@ -210,19 +219,6 @@ def _update(shape: AnyShape, key: str, new: float) -> dict[str, object]:
     if key == POINTS:
         return {key: int(new) if new == int(new) else new}
     return {key: new} if hasattr(shape, key) else shape.bodies[0].changed_by(key, new)
-
-
-def _of_face(scene: Scene, shape: AnyShape, key: str, whole: SceneParameter) -> SceneParameter:
-    """A number of a face, of which each of its contacts has its share."""
-    parts = shape.shares if key in shape.SHARED else (1.0,) * len(shape.shares)
-    shares = {contact.name: part for contact, part in zip(contacts_of(shape), parts, strict=True)}
-    mine = {i: shares[contact.name] for i, contact in enumerate(scene.contacts) if contact.name in shares}
-    quantities = tuple(scene.contacts[i].PARAMETERS[key] for i in mine)
-    first = quantities[0]
-    return replace(
-        whole, acts_on=ActsOn.CONTACTS, contacts=mine, quantities=quantities, unit=first.unit,
-        least=first.least,
-    )  # fmt: skip
 
 
 def _moved(scene: Scene, shape: AnyShape, key: str) -> dict[str, tuple[Form, ...]]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from solver.arrays import Real
 from solver.errors import SettingError
 from solver.matrices.sectors.elimination import Circulant, Elimination, elimination
-from solver.matrices.sectors.sector_parts import WHOLE, PartsAcross
+from solver.matrices.sectors.sector_parts import WHOLE
 
 if TYPE_CHECKING:
     from solver.scene.matrices_structure import MatricesStructure
@@ -133,21 +133,31 @@ def added_by_mistuning(
         A name of none of them.
     """
     deviations = np.array(factors) - 1.0
-    names, size = scalable(sector), deviations.size * _size(sector)
+    own = sector.diameters.size if sector.diameters is not None else full_elimination(sector).kept.size
+    names, size = scalable(sector), deviations.size * own
     K, M = np.zeros((size, size)), np.zeros((size, size))
     for name in of:
         if name not in names:
             raise SettingError("of", name, f"must be one of {', '.join(names) or 'none'}")
         target = M if name == "M" else K
         if sector.diameters is not None and sector.diameters.parts is not None:
-            target += _between_diameters(sector.diameters.parts, names.index(name), deviations)
+            parts, at = sector.diameters.parts, names.index(name)
+            count, n = deviations.size, parts.ahead.shape[3]
+            spectrum = np.fft.fft(deviations).conj() / count  # 1/N Σ_j δ_j e^{i m j α}
+            built, backward = _waves(count)
+            coupled: NDArray[Any] = np.empty((count, count, n, n), np.complex128)
+            for w in range(count):
+                for v in range(count):
+                    stack = parts.ahead if backward[w] == backward[v] else parts.back
+                    block = stack[at, built[w], built[v]]
+                    coupled[w, v] = spectrum[(v - w) % count] * (block.conj() if backward[w] else block)
+            # Σ_wv e^{iwjα} X_wv e^{-ivlα} / N: forward over the second wave, backward over the first.
+            blocks = np.fft.fft(np.fft.ifft(coupled, axis=0), axis=1)
+            whole = blocks.real.transpose(0, 2, 1, 3).reshape(count * n, count * n)
+            target += np.ascontiguousarray(0.5 * (whole + whole.T))
         else:
             target += _sector_by_sector(sector, name, deviations)
     return K, M
-
-
-def _size(sector: MatricesStructure) -> int:
-    return sector.diameters.size if sector.diameters is not None else full_elimination(sector).kept.size
 
 
 def _sector_by_sector(sector: MatricesStructure, name: str, deviations: Real) -> Real:
@@ -177,23 +187,6 @@ def _matrix(sector: MatricesStructure, name: str) -> Real:
     if parts is None:
         raise ValueError("a sector without parts has none to be scaled")
     return parts.matrices[parts.index(name)].array
-
-
-def _between_diameters(parts: PartsAcross, at: int, deviations: Real) -> Real:
-    """Add a part of a reduced sector, which couples all nodal diameters (`PartsAcross`)."""
-    count, n = deviations.size, parts.ahead.shape[3]
-    spectrum = np.fft.fft(deviations).conj() / count  # 1/N Σ_j δ_j e^{i m j α}
-    built, backward = _waves(count)
-    coupled: NDArray[Any] = np.empty((count, count, n, n), np.complex128)
-    for w in range(count):
-        for v in range(count):
-            stack = parts.ahead if backward[w] == backward[v] else parts.back
-            block = stack[at, built[w], built[v]]
-            coupled[w, v] = spectrum[(v - w) % count] * (block.conj() if backward[w] else block)
-    # Σ_wv e^{iwjα} X_wv e^{-ivlα} / N: forward over the second wave, backward over the first.
-    blocks = np.fft.fft(np.fft.ifft(coupled, axis=0), axis=1)
-    whole = blocks.real.transpose(0, 2, 1, 3).reshape(count * n, count * n)
-    return np.ascontiguousarray(0.5 * (whole + whole.T))
 
 
 def _waves(count: int) -> tuple[list[int], list[bool]]:

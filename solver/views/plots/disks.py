@@ -121,10 +121,16 @@ def interference_figure(answer: Json, *, ax: Into = None) -> Figure:
     Of the JSON of `solver.InterferenceDiagram`, with at least one nodal diameter.
     """
     half = answer["sectors"] // 2
-    top = _HEADROOM * _highest(answer)
+    # To the highest family with all contacts open, and the lowest one stuck.
+    free = [value for point in answer["diameters"] for value in point["open_hz"]]
+    stuck = [point["stuck_hz"][0] for point in answer["diameters"] if point["stuck_hz"]]
+    top = _HEADROOM * (max([*free, *stuck], default=1.0) or 1.0)
     with style.styled():
         page, (axes,) = style.figure(6.4, 4.4, into=ax)
-        _draw_ranges(axes, answer)
+        # What friction may move each natural frequency through.
+        for x, point in zip(_places(answer), answer["diameters"], strict=True):
+            for free, stuck in zip(point["open_hz"], point["stuck_hz"], strict=True):
+                axes.plot([x, x], [free, stuck], color=style.GREY, linewidth=3.0, alpha=0.18)
         for key, colour, words in (
             ("open_hz", style.BLUE, "all open"), ("stuck_hz", style.VERMILION, "all stuck"),
         ):  # fmt: skip
@@ -141,24 +147,10 @@ def interference_figure(answer: Json, *, ax: Into = None) -> Figure:
     return page
 
 
-def _highest(answer: Json) -> float:
-    """The top of the picture: of the families with all contacts open, and of the lowest one stuck."""
-    free = [value for point in answer["diameters"] for value in point["open_hz"]]
-    stuck = [point["stuck_hz"][0] for point in answer["diameters"] if point["stuck_hz"]]
-    return max([*free, *stuck], default=1.0) or 1.0
-
-
 def _places(answer: Json) -> list[float]:
     """Where each point stands: at its nodal diameter, beside it where the directions differ."""
     shift = {"forward": _SHIFT, "backward": -_SHIFT}
     return [point["diameter"] + shift.get(point["wave"], 0.0) for point in answer["diameters"]]
-
-
-def _draw_ranges(axes: Axes, answer: Json) -> None:
-    """What friction may move each natural frequency through."""
-    for x, point in zip(_places(answer), answer["diameters"], strict=True):
-        for free, stuck in zip(point["open_hz"], point["stuck_hz"], strict=True):
-            axes.plot([x, x], [free, stuck], color=style.GREY, linewidth=3.0, alpha=0.18)
 
 
 def _draw_families(axes: Axes, answer: Json, key: str, colour: str, words: str) -> None:

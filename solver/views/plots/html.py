@@ -86,25 +86,22 @@ def picture_page(figure: Figure, data: Dataset | None) -> str:
     title = next((text for text in titles if text), "stickslip")
     parts = [f"<h1>{escape(title)}</h1>", image(figure, title)]
     if data is not None:
-        parts += _numbers(data)
+        # The table behind the picture, and what the dataset says of itself.
+        columns = {n: v for n, v in data.table().variables.items() if not n.startswith(_IN_PARTS)}
+        heads = [f"{name} [{v.unit}]" if v.unit else name for name, v in columns.items()]
+        rows = [list(row) for row in zip(*(v.values.tolist() for v in columns.values()), strict=True)]
+        shown = (
+            f"{len(rows)} rows" if len(rows) <= MOST_ROWS else f"the first {MOST_ROWS} of {len(rows)} rows"
+        )
+        about = {name: value for name, value in data.attributes.items() if name != "scene"}
+        parts += [
+            pairs([(name, _text(value)) for name, value in about.items()]),
+            f"<details><summary>Data ({shown})</summary>{table(heads, rows[:MOST_ROWS])}</details>",
+        ]
+        if "scene" in data.attributes:
+            text = escape(str(data.attributes["scene"]))
+            parts.append(f"<details><summary>Scene (TOML)</summary><pre>{text}</pre></details>")
     return page(title, "\n".join(parts))
-
-
-def _numbers(data: Dataset) -> list[str]:
-    """The table behind a picture, and what the dataset says of itself."""
-    columns = {n: v for n, v in data.table().variables.items() if not n.startswith(_IN_PARTS)}
-    heads = [f"{name} [{v.unit}]" if v.unit else name for name, v in columns.items()]
-    rows = [list(row) for row in zip(*(v.values.tolist() for v in columns.values()), strict=True)]
-    shown = f"{len(rows)} rows" if len(rows) <= MOST_ROWS else f"the first {MOST_ROWS} of {len(rows)} rows"
-    about = {name: value for name, value in data.attributes.items() if name != "scene"}
-    parts = [
-        pairs([(name, _text(value)) for name, value in about.items()]),
-        f"<details><summary>Data ({shown})</summary>{table(heads, rows[:MOST_ROWS])}</details>",
-    ]
-    if "scene" in data.attributes:
-        text = escape(str(data.attributes["scene"]))
-        parts.append(f"<details><summary>Scene (TOML)</summary><pre>{text}</pre></details>")
-    return parts
 
 
 # Cosine and sine parts of every harmonic: in files, not in a table that is read.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -70,7 +69,29 @@ def response_figure(
         page, (axes,) = style.figure(6.0, 3.4, into=ax)
         for low, high in response.intervals:
             axes.axvspan(low, high, color=style.SKY, alpha=0.18, linewidth=0.0)
-        _draw_stability(axes, response, unit)
+        # The curve, dashed where it is not stable, with folds, branch points and ends on it.
+        height = response.amplitude * unit.per_metre
+        unstable = np.zeros(height.size, bool) if response.unstable is None else response.unstable
+        if not unstable.any():
+            axes.plot(response.values, height, color=style.BLUE)
+        else:
+            axes.plot(response.values, np.where(unstable, np.nan, height), color=style.BLUE, label="stable")
+            beside = unstable.copy()
+            beside[1:] |= unstable[:-1]
+            beside[:-1] |= unstable[1:]
+            axes.plot(
+                response.values, np.where(beside, height, np.nan), color=style.BLUE, linestyle=_DASHED,
+                label="not stable",
+            )  # fmt: skip
+        for kind, marker in _MARKERS.items():
+            places = [(at, value * unit.per_metre) for name, at, value in response.marks if name == kind]
+            if places:
+                axes.plot(
+                    *zip(*places, strict=True), color=style.INK, marker=marker, markersize=4.5,
+                    markerfacecolor="white", linestyle="none", label=kind.replace("_", " "), zorder=4,
+                )  # fmt: skip
+        if unstable.any() or response.marks:
+            axes.legend(loc="best")
         if response.peak is not None:
             _mark_peak(axes, response, response.peak, unit)
         style.label(axes, axis_name(response.parameter), response.measured.label("amplitude", unit))
@@ -88,7 +109,8 @@ def family_figure(family: Family) -> Figure:
     with style.styled():
         page, (axes,) = style.figure(6.6, 4.0)
         _draw(axes, family.free, unit, "removed (linear)", color=style.GREY, dashes=_DOTTED)
-        shades = _shades(len(family.members))
+        # Colours from light to dark, told apart by everybody and in grey.
+        shades = [tuple(colormaps["viridis"](place)) for place in np.linspace(0.85, 0.1, len(family.members))]
         for (value, curve), shade in zip(family.members, shades, strict=True):
             if value == family.optimum:
                 _draw(axes, curve, unit, f"{value:.4g} (optimum)", color=style.VERMILION, width=2.2, order=3)
@@ -153,43 +175,12 @@ def axis_name(path: str) -> str:
     return f"{path} [{unit}]" if unit else path
 
 
-def _shades(count: int) -> Sequence[tuple[float, float, float, float]]:
-    """Colours from light to dark, told apart by everybody and in grey."""
-    return [tuple(colormaps["viridis"](place)) for place in np.linspace(0.85, 0.1, count)]
-
-
 def _draw(
     axes: Axes, curve: Response, unit: units.LengthUnit, name: str, *, color: object, width: float = 1.2,
     dashes: tuple[int, tuple[float, ...]] | str = "-", order: float = 2,
 ) -> None:  # fmt: skip
     height = curve.amplitude * unit.per_metre
     axes.plot(curve.values, height, color=color, linewidth=width, linestyle=dashes, label=name, zorder=order)
-
-
-def _draw_stability(axes: Axes, curve: Response, unit: units.LengthUnit) -> None:
-    """The curve, dashed where it is not stable, with folds, branch points and ends on it."""
-    height = curve.amplitude * unit.per_metre
-    unstable = np.zeros(height.size, bool) if curve.unstable is None else curve.unstable
-    if not unstable.any():
-        axes.plot(curve.values, height, color=style.BLUE)
-    else:
-        axes.plot(curve.values, np.where(unstable, np.nan, height), color=style.BLUE, label="stable")
-        beside = unstable.copy()
-        beside[1:] |= unstable[:-1]
-        beside[:-1] |= unstable[1:]
-        axes.plot(
-            curve.values, np.where(beside, height, np.nan), color=style.BLUE, linestyle=_DASHED,
-            label="not stable",
-        )  # fmt: skip
-    for kind, marker in _MARKERS.items():
-        places = [(at, value * unit.per_metre) for name, at, value in curve.marks if name == kind]
-        if places:
-            axes.plot(
-                *zip(*places, strict=True), color=style.INK, marker=marker, markersize=4.5,
-                markerfacecolor="white", linestyle="none", label=kind.replace("_", " "), zorder=4,
-            )  # fmt: skip
-    if unstable.any() or curve.marks:
-        axes.legend(loc="best")
 
 
 def _mark_peak(axes: Axes, curve: Response, peak: tuple[float, float], unit: units.LengthUnit) -> None:

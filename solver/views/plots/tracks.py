@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
@@ -55,7 +54,10 @@ def track_figure(track: Json, *, ax: Into = None) -> Figure:
                 ha=side, va="top", color=style.VERMILION, linespacing=1.35,
             )  # fmt: skip
         for axes in (heights, places):
-            _scaled(axes, parameter)
+            if _is_wide(parameter):
+                axes.set_xscale("log")
+                style.plain_log(axes.xaxis)
+            axes.margins(x=0.0)
         heights.set_yscale("log")
         style.plain_log(heights.yaxis)
         low, high = peak.min() * unit.per_metre, peak.max() * unit.per_metre
@@ -87,7 +89,13 @@ def map_figure(found: Json, *, ax: Into = None) -> Figure:
         )  # fmt: skip
         axes.grid(visible=False)
         if found["ridge"] is not None and found["ridge"]["parameter"]:
-            _draw_ridge(axes, found["ridge"])
+            ridge = found["ridge"]
+            for line in ridge["competing"]:
+                axes.plot(line["frequency"], line["parameter"], color="white", linewidth=0.7, linestyle=":")
+            parameter, frequency = ridge_lines(ridge)
+            axes.plot(frequency, parameter, color="white", linewidth=1.4)
+            for peak in ridge["optimum"]["active"]:
+                axes.plot([peak["frequency"]], [ridge["optimum"]["at"]], **_DOT)
         if _is_wide(parameter):
             axes.set_yscale("log")
             style.plain_log(axes.yaxis)
@@ -160,24 +168,6 @@ _DOT: dict[str, Any] = {
     "linestyle": "none",
     "zorder": 5,
 }
-
-
-def _draw_ridge(axes: Axes, ridge: Json) -> None:
-    """Competing peaks as dots, the highest as a line that is broken where another becomes the highest."""
-    for line in ridge["competing"]:
-        axes.plot(line["frequency"], line["parameter"], color="white", linewidth=0.7, linestyle=":")
-    parameter, frequency = ridge_lines(ridge)
-    axes.plot(frequency, parameter, color="white", linewidth=1.4)
-    for peak in ridge["optimum"]["active"]:
-        axes.plot([peak["frequency"]], [ridge["optimum"]["at"]], **_DOT)
-
-
-def _scaled(axes: Axes, values: np.ndarray) -> None:
-    """Make the axis of the parameter logarithmic where its ends differ by more than a few times."""
-    if _is_wide(values):
-        axes.set_xscale("log")
-        style.plain_log(axes.xaxis)
-    axes.margins(x=0.0)
 
 
 def _is_wide(values: np.ndarray) -> bool:

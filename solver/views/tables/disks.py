@@ -29,7 +29,19 @@ def interference(found: Mapping[str, Any]) -> Iterator[Block]:
     title = f"{found['scene']}, {found['sectors']} sectors"
     yield ResultTable(title, ("nodal diameter", "all open [Hz]", "all stuck [Hz]"), rows)
     if found["speed_rpm"] is not None:
-        yield _crossings(found)
+        crossings = [
+            (
+                str(one["order"]), f"{one['frequency_hz']:.6g}",
+                f"{one['diameter']}{'' if one['wave'] == 'standing' else ' ' + one['wave']}",
+                str(one["family"]),
+                f"{one['open_hz']:.6g} to {one['stuck_hz']:.6g}",
+                "meets it" if one["inside"] else f"{100.0 * one['margin']:.3g} % away",
+            )
+            for one in found["crossings"]
+        ]  # fmt: skip
+        title = f"orders within {100.0 * found['within']:g} % of a family at {found['speed_rpm']:g} rpm"
+        names = ("order", "frequency [Hz]", "nodal diameter", "family", "open to stuck [Hz]", "")
+        yield ResultTable(title, names, crossings)
     pairs = []
     if found["missing"]:
         pairs.append(("warning", MISSING.format(", ".join(map(str, found["missing"])))))
@@ -37,30 +49,8 @@ def interference(found: Mapping[str, Any]) -> Iterator[Block]:
     yield Summary("", pairs)
 
 
-def _crossings(found: Mapping[str, Any]) -> ResultTable:
-    rows = [
-        (
-            str(one["order"]), f"{one['frequency_hz']:.6g}",
-            f"{one['diameter']}{'' if one['wave'] == 'standing' else ' ' + one['wave']}", str(one["family"]),
-            f"{one['open_hz']:.6g} to {one['stuck_hz']:.6g}",
-            "meets it" if one["inside"] else f"{100.0 * one['margin']:.3g} % away",
-        )
-        for one in found["crossings"]
-    ]  # fmt: skip
-    title = f"orders within {100.0 * found['within']:g} % of a family at {found['speed_rpm']:g} rpm"
-    names = ("order", "frequency [Hz]", "nodal diameter", "family", "open to stuck [Hz]", "")
-    return ResultTable(title, names, rows)
-
-
 def _listed(values: list[float]) -> str:
     return "  ".join(f"{value:9.2f}" for value in values) or "none"
-
-
-def _errors(found: Mapping[str, Any]) -> str:
-    """How well the mean is known: by the error of the peaks, and as that of a few disks of all."""
-    by_peaks, by_disks = found.get("mean_error"), found.get("standard_error")
-    of_peaks = "" if by_peaks is None else f", known to {by_peaks:.2g} by the error of the peaks"
-    return of_peaks + ("" if by_disks is None else f", standard error {by_disks:.2g} by the number of disks")
 
 
 def mistuning(found: Mapping[str, Any]) -> Iterator[Block]:
@@ -72,7 +62,13 @@ def mistuning(found: Mapping[str, Any]) -> Iterator[Block]:
         height = units.length(tuned["peak"])
         pairs.append((f"tuned, {Measured.of_result(found).name}", f"{height} at {tuned['at_hz']:.6g} Hz"))
     if found["mean"] is not None:
-        pairs.append(("magnification", f"{found['mean']:.4g} in the mean{_errors(found)}"))
+        # How well the mean is known: by the error of the peaks, and as that of a few disks of all.
+        by_peaks, by_disks = found.get("mean_error"), found.get("standard_error")
+        of_peaks = "" if by_peaks is None else f", known to {by_peaks:.2g} by the error of the peaks"
+        known = of_peaks + (
+            "" if by_disks is None else f", standard error {by_disks:.2g} by the number of disks"
+        )
+        pairs.append(("magnification", f"{found['mean']:.4g} in the mean{known}"))
         if found["deviation"] is not None:
             pairs.append(("  deviation of the disks", f"{found['deviation']:.2g}"))
     pairs += [

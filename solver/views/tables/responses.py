@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from solver.results import units
@@ -66,7 +66,11 @@ def solution(found: Json) -> Iterator[Block]:
         of = WORDS[HALF_PEAK_TO_PEAK if "mean_undetermined" in found["flags"] else MAX_ABS]
         pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of {of}"))
     pairs += proved([found["certificate"]] if found.get("certificate") else [])
-    pairs.append(("harmonics 1 to 5", _harmonics(found["harmonics"])))
+    # The first five; what rounding leaves of one is 0.
+    amplitudes = found["harmonics"]
+    least = ROUNDING * max(amplitudes)
+    told = ", ".join(units.length(a if a > least else 0.0) for a in amplitudes[1:6])
+    pairs.append(("harmonics 1 to 5", told))
     states = found["contacts"]
     pairs += [(f"contact {name}", state) for name, state in states.items()][:_EACH_CONTACT]
     if len(states) > _EACH_CONTACT:
@@ -86,12 +90,6 @@ def solution(found: Json) -> Iterator[Block]:
 def _notes(found: Json) -> Pairs:
     """What a response says of itself by flags, and its notes."""
     return [("note", words) for words in flag_words(found.get("flags", ()))] + note_pairs(found)
-
-
-def _harmonics(amplitudes: Sequence[float]) -> str:
-    """Return the first five; what rounding leaves of one is 0."""
-    least = ROUNDING * max(amplitudes)
-    return ", ".join(units.length(a if a > least else 0.0) for a in amplitudes[1:6])
 
 
 def proved(proofs: Iterable[Json]) -> Pairs:
@@ -153,7 +151,9 @@ def branch(found: Json) -> Iterator[Block]:
     if found.get("mean_undetermined"):
         pairs.append(("note", "at the highest peak " + FLAGS["mean_undetermined"]))
     if found["band_hz"] is not None:
-        pairs.append(("band", _band(found)))
+        above = f"{units.number(found['band_hz'])} Hz above {units.length(found['band_limit'])}"
+        intervals = [f"{low:.6g} to {high:.6g}" for low, high in found["band_intervals_hz"]]
+        pairs.append(("band", f"{above}: {', '.join(intervals)}" if intervals else above))
     effort = f"{found['newton_iterations']} Newton iterations, {found['rejected_steps']} steps rejected"
     pairs += sure_of(found)
     pairs += _drift(found)
@@ -246,9 +246,3 @@ def _peaks(found: Json, path: str) -> Pairs:
     others = [other for other in interior if other != peak]
     named = [(highest, peak), *(("further peak", other) for other in others)]
     return [(name, f"{units.length(p['value'])} at {parameter(path, p['at'])}") for name, p in named]
-
-
-def _band(found: Json) -> str:
-    above = f"{units.number(found['band_hz'])} Hz above {units.length(found['band_limit'])}"
-    intervals = [f"{low:.6g} to {high:.6g}" for low, high in found["band_intervals_hz"]]
-    return f"{above}: {', '.join(intervals)}" if intervals else above

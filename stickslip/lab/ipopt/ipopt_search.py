@@ -59,7 +59,28 @@ def ipopt_search(
         rows = _Rows(evaluate, variables, model, model_of)
         rows.seen(best, model)
         before = model.merit
-        _run(rows, model, region)
+        n, m, groups = model.z.size, model.heights.size, rows.unique
+        functions = _Programme(rows, n, len(groups))
+        z, t = casadi.MX.sym("z", n), casadi.MX.sym("t", len(groups))
+        numbers = functions.numbers(z)
+        which = [int(np.flatnonzero(groups == g)[0]) for g in model.groups]
+        parts = [t[g] - numbers[i] for i, g in enumerate(which)] + [-numbers[j] for j in range(m, rows.count)]
+        constraints = casadi.vertcat(*parts)
+        programme: dict[str, Any] = {"x": casadi.vertcat(z, t), "f": casadi.sum1(t), "g": constraints}
+        options, exact = _OPTIONS, all(row.second is not None for row in (*model.rows, *model.limited))
+        if exact:
+            ipopt = {**_OPTIONS["ipopt"], "hessian_approximation": "exact"}
+            options = {**_OPTIONS, "ipopt": ipopt, "hess_lag": functions.hessian}
+        solver = casadi.nlpsol("design", "ipopt", programme, options)
+        tops = [model.heights[model.groups == g].max() for g in groups]
+        solver(
+            x0=np.concatenate([model.z, tops]),
+            lbx=np.append(np.maximum(model.z - region, 0.0), np.full(len(groups), -np.inf)),
+            ubx=np.append(np.minimum(model.z + region, 1.0), np.full(len(groups), np.inf)),
+            lbg=0.0, ubg=np.inf,
+        )  # fmt: skip
+        if functions.failure is not None:
+            raise functions.failure
         best, model = rows.best, model_of(rows.best)
         on_bounds = snapped(model.z)
         if np.any(on_bounds != model.z):
@@ -253,28 +274,3 @@ class _Programme:
         # Every row stands in the programme with a minus sign.
         whole[:n, :n] = self._values(x[:n]).lagrangian(-multipliers)
         return casadi.DM(upper, casadi.DM(whole)[upper].nonzeros())
-
-
-def _run(rows: _Rows, model: Model, region: float) -> None:
-    """Solve one programme from a model; the designs tried are kept by `rows`."""
-    n, m, groups = model.z.size, model.heights.size, rows.unique
-    functions = _Programme(rows, n, len(groups))
-    z, t = casadi.MX.sym("z", n), casadi.MX.sym("t", len(groups))
-    numbers = functions.numbers(z)
-    which = [int(np.flatnonzero(groups == g)[0]) for g in model.groups]
-    parts = [t[g] - numbers[i] for i, g in enumerate(which)] + [-numbers[j] for j in range(m, rows.count)]
-    constraints = casadi.vertcat(*parts)
-    programme: dict[str, Any] = {"x": casadi.vertcat(z, t), "f": casadi.sum1(t), "g": constraints}
-    options, exact = _OPTIONS, all(row.second is not None for row in (*model.rows, *model.limited))
-    if exact:
-        ipopt = {**_OPTIONS["ipopt"], "hessian_approximation": "exact"}
-        options = {**_OPTIONS, "ipopt": ipopt, "hess_lag": functions.hessian}
-    solver = casadi.nlpsol("design", "ipopt", programme, options)
-    tops = [model.heights[model.groups == g].max() for g in groups]
-    solver(
-        x0=np.concatenate([model.z, tops]),
-        lbx=np.append(np.maximum(model.z - region, 0.0), np.full(len(groups), -np.inf)),
-        ubx=np.append(np.minimum(model.z + region, 1.0), np.full(len(groups), np.inf)), lbg=0.0, ubg=np.inf,
-    )  # fmt: skip
-    if functions.failure is not None:
-        raise functions.failure

@@ -9,9 +9,8 @@ from measured_cases import TWO_DOF, incremental_loop, table, two_dof_runs
 
 import optim
 import solver
-from optim.identification.fit import Runs
+from optim.identification.fit import Runs, read_unknowns
 from optim.identification.reading import read_data
-from optim.identification.unknowns import read_unknowns
 from optim.problem.checks import DesignError
 from optim.problem.uncertainty_input import read_uncertain
 from optim.views.tables.studies import identification

@@ -17,8 +17,8 @@ from solver.balance.balance import build
 from solver.balance.workspace import Workspace
 from solver.linear.assembly import linear_model
 from solver.matrices.mortar import face
-from solver.matrices.sectors.decks import Deck
 from solver.matrices.sectors.elimination import rotation
+from solver.matrices.sectors.loading import Deck
 from solver.sensitivity.gradient import Sensitivities
 
 TWO_PI = 2.0 * math.pi

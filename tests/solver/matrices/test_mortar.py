@@ -23,7 +23,7 @@ from service.cli import main
 from solver.linear.assembly import linear_model
 from solver.matrices.decks.deck import Deck, shape_of
 from solver.matrices.mortar import MortarPair, mortar
-from solver.matrices.sectors.decks import read_deck
+from solver.matrices.sectors.loading import read_deck
 from solver.scene.cyclic.annulus import annulus
 
 ROOT = Path(__file__).resolve().parent.parent.parent.parent

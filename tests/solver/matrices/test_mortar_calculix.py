@@ -16,7 +16,7 @@ import pytest
 
 from solver.matrices.load_set import read_set
 from solver.matrices.mortar import mortar
-from solver.matrices.sectors.decks import read_deck
+from solver.matrices.sectors.loading import read_deck
 
 STIFF = 1e8  # N/m³, beside 1e3 N/m² of the blocks
 BLOCK = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))

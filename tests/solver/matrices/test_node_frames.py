@@ -20,8 +20,7 @@ from solver.errors import SceneError
 from solver.matrices.decks.deck import GLOBAL, CoordinateKind, CoordinateSystem, Deck, frames
 from solver.matrices.load_set import MatrixSet, in_global
 from solver.matrices.readers.numbers_in_text import FormatError, Label
-from solver.matrices.sectors.decks import check_alone, read_deck
-from solver.matrices.sectors.loading import boundaries
+from solver.matrices.sectors.loading import boundaries, check_alone, read_deck
 from solver.scene.scene import MatricesStructure
 
 Array = np.ndarray

@@ -14,8 +14,8 @@ from sector_files import DOFS, SECTORS, TABLES, scene_of, sector_files
 import solver
 from service.cli import main
 from solver.matrices.readers.numbers_in_text import FormatError
-from solver.matrices.sectors.decks import read_deck
 from solver.matrices.sectors.elimination import elimination, phase_factor
+from solver.matrices.sectors.loading import read_deck
 from solver.matrices.sectors.outline import KEYS, SectorOutline, outline_of
 from solver.matrices.sectors.sector_reduction import read_sector
 from solver.views.shapes import deflection_shape, mode_shape, shape_of_motion

@@ -22,9 +22,8 @@ from solver.linear.assembly import linear_model
 from solver.matrices import craig_bampton
 from solver.matrices.load_set import MatrixSet, read_set
 from solver.matrices.readers.numbers_in_text import FormatError, Label
-from solver.matrices.sectors.decks import Deck, read_deck
 from solver.matrices.sectors.elimination import elimination, rotation
-from solver.matrices.sectors.loading import boundaries, groups, paired
+from solver.matrices.sectors.loading import Deck, boundaries, groups, paired, read_deck
 from solver.matrices.sectors.sector_reduction import diameters_met, reduce_sector
 from stickslip.lab.worst_mistuning.linear_disk import Contacts, linear_disk, with_factors
 

@@ -13,7 +13,7 @@ from solver.balance.balance import build
 from solver.balance.workspace import Workspace
 from solver.continuation.branches.observation import observed_balance, observing
 from solver.continuation.from_nothing import solve_from_nothing
-from solver.marching.march_start import MarchStart
+from solver.marching.march import MarchStart
 from solver.response.worst_mean import WorstMean, WorstMeanSlopes, used_most
 from solver.scene.materials import haigh_of
 from solver.sensitivity.gradient import Sensitivities

@@ -10,7 +10,7 @@ from mistuned_cases import disk
 import solver
 from solver import ResidualPeak, Scene, SettingError, WorstSearch, mistuned, worst_mistuning
 from solver.jit import fourier
-from solver.marching.march_start import MarchStart
+from solver.marching.march import MarchStart
 from solver.response.contact_response import LeftForces
 from solver.studies.instant import start_of
 from stickslip.lab.worst_mistuning.climbing import Bounds
