@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 from optim.criteria.constraint_rows import CaseResponse, DesignEvaluation
 from optim.criteria.criterion import Criterion, CriterionRow, Judged, criteria
+from optim.criteria.peak_criterion import PEAK
 from optim.problem.cases import LoadCase
 from optim.problem.design_problem import Problem
 from optim.problem.variables import parameter_values
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects
-from solver.continuation.branch import Branch
+from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.stretches import Course
@@ -26,10 +28,12 @@ from solver.studies.peaks.peak_lines import fitted
 # A response that does not cover its range tells a design nothing; a usual one has 80 to 800 points.
 SETTINGS = ContinuationSettings(most_points=4000, unfinished_peaks=False)
 
+_LOST = (BranchStatus.NO_START, BranchStatus.STALLED, BranchStatus.TURNED_BACK)
+
 
 def evaluate(
     problem: Problem, values: Mapping[str, float], *, gradients: bool = True, errors: bool = True,
-    should_stop: ShouldStop = None, before: DesignEvaluation | None = None,
+    should_stop: ShouldStop = None, before: DesignEvaluation | None = None, most: float = math.inf,
 ) -> DesignEvaluation:  # fmt: skip
     """Compute everything a design is judged by.
 
@@ -42,6 +46,7 @@ def evaluate(
     should_stop : asked while the responses are computed.
     before : the same design by another measure, whose responses serve here, or with other harmonics, whose
         responses begin where these do.
+    most : of what is minimised; a design that comes to more is looked at no further.
 
     Returns
     -------
@@ -52,7 +57,9 @@ def evaluate(
     for case in problem.cases:
         known = [response.branch for response in responses if response.case == case.served_by]
         earlier = [] if before is None else [one.branch for one in before.responses if one.case == case.name]
-        found = _case(problem, case, values, known, earlier, gradients, errors, should_stop)
+        highest = most / max(problem.weights[PEAK] * case.weight, 1e-300)
+        settings = replace(SETTINGS, errors=errors, highest=highest)
+        found = _case(problem, case, values, known, earlier, gradients, settings, should_stop)
         responses += found[0]
         rows += found[1]
         if not all(response.branch.reached for response in found[0]):
@@ -62,7 +69,7 @@ def evaluate(
 
 def _case(
     problem: Problem, case: LoadCase, values: Mapping[str, float], known: Sequence[Branch],
-    earlier: Sequence[Branch], gradients: bool, errors: bool, should_stop: ShouldStop,
+    earlier: Sequence[Branch], gradients: bool, settings: ContinuationSettings, should_stop: ShouldStop,
 ) -> tuple[list[CaseResponse], list[CriterionRow]]:  # fmt: skip
     """Compute the responses and rows of one case."""
     here = case.scene.with_values(parameter_values(problem.variables, values))
@@ -77,26 +84,32 @@ def _case(
             if there.reached:
                 branch = observing(
                     there, here.observe.dof, measure=here.observe.measure, limit=problem.limit,
-                    errors=errors,
+                    errors=settings.errors,
                 )  # fmt: skip
         else:
-            start, stop = over.hertz or (None, None)
-            branch = sweep(
-                here, start=start, stop=stop, harmonics=problem.harmonics, limit=problem.limit,
-                settings=replace(SETTINGS, errors=errors), effects=effects, should_stop=should_stop,
-                course=None if there is None else _begin(problem, here, effects, there),
-            )  # fmt: skip
+            ends = over.hertz or here.observe.band
+            for start, stop in (ends, ends[::-1]):  # what is lost from one end may not be from the other
+                branch = sweep(
+                    here, start=start, stop=stop, harmonics=problem.harmonics, limit=problem.limit,
+                    settings=settings, effects=effects, should_stop=should_stop,
+                    course=None if there is None else _begin(problem, here, effects, there, stop < start),
+                )  # fmt: skip
+                if branch.status not in _LOST:
+                    break
         responses.append(CaseResponse(case=case.name, branch=branch, shared=shared))
         rows += rows_of(problem, case, branch, over, gradients=gradients)
     return responses, rows
 
 
-def _begin(problem: Problem, scene: Scene, effects: Effects, branch: Branch) -> Course | None:
+def _begin(
+    problem: Problem, scene: Scene, effects: Effects, branch: Branch, down: bool
+) -> Course | None:  # fmt: skip
     """Return where a response begins, by that of the same design with other harmonics."""
     if not len(branch.solutions):
         return None
     balance = build(scene, "frequency", harmonics=problem.harmonics, frequency_hz=None, effects=effects)
-    return Course(guess=fitted(branch.solutions[0, :-1], branch.balance.system.ks, balance))
+    nearest = 0 if (branch.values[0] <= branch.values[-1]) != down else -1
+    return Course(guess=fitted(branch.solutions[nearest, :-1], branch.balance.system.ks, balance))
 
 
 def effects_of(problem: Problem, scene: Scene) -> Effects:

@@ -19,6 +19,7 @@ from solver.results.watch import OnProgress, ShouldStop
 
 MOST_EVALUATIONS = 800
 SEARCHED = 0.75  # share of the progress that the search has
+FAR_ABOVE = 20.0  # times the best, from where on no model leads below it: see `surrogate.MOST_GROWTH`
 USUAL = 12.0  # evaluations of a usual search; how many are left is not known beforehand
 
 
@@ -56,6 +57,7 @@ class DesignSearch:
         self._above = above  # the search with all harmonics, for which this one only ranks designs
         self._scout: DesignSearch | None = None
         self._least = (math.inf, math.inf)
+        self._best = self._enough = math.inf  # least objective that keeps all limits; the highest followed
         self._known: dict[tuple[float, ...], DesignEvaluation] = {}
         # By identity, with the evaluation itself, which so keeps its place in memory.
         self._models: dict[int, tuple[DesignEvaluation, Model]] = {}
@@ -78,7 +80,8 @@ class DesignSearch:
         if len(self.history) >= self._most:
             raise SearchStoppedError(DesignStatus.TOO_MANY)
         evaluation = self._ahead.take(place) or evaluate(
-            self.problem, values, errors=False, should_stop=self.should_stop, before=self._earlier.get(place)
+            self.problem, values, errors=False, should_stop=self.should_stop, before=self._earlier.get(place),
+            most=self._enough,
         )  # fmt: skip
         self._known[place] = evaluation
         self.keep(evaluation)
@@ -87,9 +90,11 @@ class DesignSearch:
     def ahead(self, several: Iterable[Mapping[str, float]]) -> None:
         """Compute designs that will be asked for, where there are others to do so."""
         calls = {self._place(values): (values,) for values in several}
+        self._enough = FAR_ABOVE * self._best
         known = self._known.keys() | self._earlier.keys()
         unknown = {place: call for place, call in calls.items() if place not in known}
-        self._ahead.compute(partial(evaluate, self.problem, errors=False), unknown)
+        judged = partial(evaluate, self.problem, errors=False, most=self._enough)
+        self._ahead.compute(judged, unknown)
 
     def _place(self, values: Mapping[str, float]) -> tuple[float, ...]:
         return tuple(values[variable.name] for variable in self.variables)
@@ -129,6 +134,8 @@ class DesignSearch:
         self.history.append(evaluation)
         if not self._scale and evaluation.good:
             self._scale = evaluation.objective
+        if evaluation.good and evaluation.violation(self.scales) <= KEPT:
+            self._best = min(self._best, evaluation.objective)
         if self.on_best is not None and evaluation.good:
             self._compare(evaluation, self.on_best)
         if self.on_progress is not None:

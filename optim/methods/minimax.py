@@ -158,6 +158,7 @@ LARGEST_RADIUS = 0.5
 SMALLEST_RADIUS = 1e-9
 STATIONARY = 1e-11  # predicted relative decrease below which a design is optimal
 MOST_STEPS = 40
+JUMP, AT_A_JUMP = 5.0, 1e-5  # a rise over what slopes tell; relative decrease up to which nothing is gained
 FIRST_PENALTY = 1.0  # times the objective: far above the multipliers, it makes limits that bend too steep
 STRONGER = 10.0  # factor of a penalty that leaves limits broken
 ENOUGH = 1e-4  # share of the predicted decrease from which a step is taken
@@ -212,6 +213,8 @@ def minimax_search(
             hessian = _curvature(model, fresh, _pulls(known, step), hessian, accepted=ratio > ENOUGH)
             seen.append(model if ratio > ENOUGH else fresh)
         size = float(np.linalg.norm(step.step, 2 if ball else np.inf))
+        if decrease <= AT_A_JUMP * model.merit and _jumps(model, fresh, size):
+            break
         if ratio > 0.75 and size > 0.9 * radius:
             radius = min(2.0 * radius, LARGEST_RADIUS)
         elif ratio < 0.25:
@@ -221,6 +224,12 @@ def minimax_search(
             if model.merit <= enough:
                 break
     return ended(here, replace(with_cuts(model, seen, SAME_DESIGN), penalty=PENALTY), variables)
+
+
+def _jumps(model: Model, fresh: Model, size: float) -> bool:
+    """Return whether what is minimised rises over a step by far more than the slopes at its ends tell."""
+    steepest = max(float(np.abs(one.slopes).sum(axis=1).max()) for one in (model, fresh))
+    return fresh.objective - model.objective > JUMP * steepest * size
 
 
 def _too_weak(model: Model, step: Step) -> bool:

@@ -69,19 +69,12 @@ class KnownSprings:
 # The mean and the first: with these Newton's method from full stick nearly always ends well.
 FEWEST_HARMONICS = 2
 ALONG = 1e-6  # share of a motion below which it has no part along a direction
-_LEAST_RISE = 1e-3  # share of the excitation below which it is raised no further
 
 
 Way = Callable[[Real, float], tuple[bool, int, float]]
 """From nothing or a guess to (whether u solves at λ, iterations, relative residual), u in place."""
-
-
-def _in_place(
-    way: Callable[..., tuple[bool, int, float]], system: System, linear: Receptance, point: Evaluation,
-    u: Real, p: float,
-) -> tuple[bool, int, float]:  # fmt: skip
-    """Take one of the compiled ways from nothing."""
-    return way(system, linear, u, p, point)
+Arc = Callable[["Workspace", float], tuple[Real | None, int]]
+"""To (slip motions at λ [m], None where it does not lead there; iterations)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,17 +135,21 @@ class Workspace:
         springs = KnownSprings(balance.system, balance.parameter.kind)
         return cls(balance, system, new_receptance(system), new_evaluation(system), loop, springs)
 
-    def solve(self, p: float, guess: Real | None = None) -> PointSolution:
+    def solve(
+        self, p: float, guess: Real | None = None, arc: Arc | None = None, *, quick: bool = False
+    ) -> PointSolution:  # fmt: skip
         """Solve at λ = `p` (inside unit): from `guess` if given, else from nothing.
 
         From nothing, Newton starts at the fully stuck response; if that fails, the harmonics are added
-        little by little, beginning with the first alone, the contacts are made soft and then stiffer, the
-        load is walked down rung by rung from full stick, and the excitation is raised from nothing (under
-        constant forces also from the static equilibrium). Where contacts alone hold a part, it is looked
+        little by little, beginning with the first alone, the contacts are made soft and then stiffer, and
+        the load is walked down rung by rung from full stick. Where contacts alone hold a part, it is looked
         first whether friction can hold its mean load, and where no contact holds it, whether a force drives
         it away. What is found obeys mechanics, see `solver.balance.kernels.mechanics`.
+
+        Behind all these ways an `arc` is followed. Under constant forces most of them take long and fail: it
+        is followed before those, which are not taken where it has to be `quick`.
         """
-        ways, first = self._ways()
+        ways, first = self._ways(arc, quick)
         if not len(self.balance.system.loose) or self.balance.system.hold:
             return self._plain(p, ways, guess)
         if not self.friction_can_hold(p):
@@ -163,7 +160,7 @@ class Workspace:
             first = 1
         found = self._plain(p, ways[:first], guess)
         if not found.converged:
-            held = self._held_in_place(p, found.iterations)
+            held = self._held_in_place(p, found.iterations, guess, quick or arc is not None)
             if held.ratchets and not together:
                 # Where residual friction forces let every contact stick it does not.
                 sticks = may_stick(self.balance, self.system, self.receptance(p), self._stuck(p), p)
@@ -197,26 +194,29 @@ class Workspace:
             lost |= bool(good)
         return PointSolution(converged=False, u=u, iterations=spent, residual=float(norm), loses_power=lost)
 
-    def _ways(self) -> tuple[tuple[Way, ...], int]:
+    def _ways(self, arc: Arc | None, quick: bool) -> tuple[tuple[Way, ...], int]:
         """Return the ways to a solution from nothing in their order, each as `newton` with u in place.
 
         The number of them that are tried before a part is held in place is the second value. Under constant
         forces the others take most of the time and find no motion of a part that a force drives away.
         """
         system, linear, point = self.system, self.linear, self.point
-        stuck = partial(_in_place, from_stuck, system, linear, point)
-        rungs = partial(_in_place, ladder, system, linear, point)
+        stuck, rungs = (
+            lambda u, p, way=way: way(system, linear, u, p, point) for way in (from_stuck, ladder)
+        )
         soft = partial(solve_softened, self.balance.system, linear, point)
-        at_rest = partial(self._by_level, at_rest=True)
+        along = () if arc is None else (partial(self._along, arc),)
         if self.balance.system.constant_mean:
-            return (self._from_fewer, stuck, self._by_level, soft, at_rest, rungs), 2
+            fewer = partial(self._from_fewer, arc)
+            return (fewer, stuck, *along, *(() if quick else (soft, rungs))), 2
+        fewer = partial(self._from_fewer, None)
         if np.any(self.balance.system.shift):  # contacts hold it: the less they stick the farther it may seem
             # What sticks with all it can carry is at its limit, where Newton's method is slow.
             onward = (self._onward,) if self.balance.system.hold else ()
-            ways = (stuck, *onward, rungs, self._from_fewer, soft, self._by_level)
+            ways = (stuck, *onward, rungs, fewer, soft)
         else:
-            ways = (stuck, self._from_fewer, soft, rungs, self._by_level)
-        return ways, len(ways)
+            ways = (stuck, fewer, soft, rungs)
+        return (*ways, *along), len(ways)
 
     def _onward(self, u: Real, p: float) -> tuple[bool, int, float]:
         """Go on from `u` while that brings it ten times nearer, the result in `u`; as `newton`."""
@@ -228,13 +228,45 @@ class Workspace:
                 return good, spent, norm
             before = norm
 
-    def _from_fewer(self, u: Real, p: float) -> tuple[bool, int, float]:
-        """Add the harmonics little by little, the result in `u`; as `newton`."""
-        ks, coarse = self._with_fewer_harmonics(p)
-        if not coarse.converged:
-            return False, coarse.iterations, np.inf
-        good, more, norm = self._newton(self._padded(coarse.u, ks), u, p)
-        return good, coarse.iterations + more, norm
+    def _along(self, arc: Arc, u: Real, p: float) -> tuple[bool, int, float]:
+        """Follow an arc, the result in `u`; as `newton`."""
+        end, spent = arc(self, p)
+        if end is None:
+            return False, spent, np.inf
+        good, more, norm = self._newton(end, u, p)
+        return good, spent + more, norm
+
+    def _from_fewer(self, arc: Arc | None, u: Real, p: float) -> tuple[bool, int, float]:
+        """Add the harmonics little by little, the result in `u`; as `newton`.
+
+        They become half as many again each time. Where Newton's method fails from one number to the next it
+        is tried for the one between, and where none is from stuck contacts, then along an arc.
+        """
+        counts, spent = [self.balance.system.ks.size], 0
+        last: tuple[Real, Integer] | None = None
+        while (fewer := max(2 * counts[-1] // 3, FEWEST_HARMONICS)) < counts[-1]:
+            counts.append(fewer)
+        while counts:
+            whole = len(counts) == 1
+            here = self if whole else Workspace.of(fewer_harmonics(self.balance, counts[-1]))
+            v, good, norm = np.zeros(here.balance.n_unknowns), False, np.inf
+            if last is not None:
+                good, more, norm = here._newton(here._padded(*last), v, p)
+                spent += more
+                between = (counts[-1] + last[1].size) // 2
+                if not good and between > last[1].size:
+                    counts.append(between)
+                    continue
+            if not good and not whole:
+                good, more, norm = from_stuck(here.system, here.linear, v, p, here.point)
+                spent += more
+                if not good and arc is not None:
+                    good, more, norm = here._along(arc, v, p)
+                    spent, arc = spent + more, arc if good else None
+            last = (v, here.balance.system.ks) if good else None
+            counts.pop()
+        u[:] = v
+        return bool(good), int(spent), float(norm)
 
     def solve_from(self, p: float, guess: Real) -> PointSolution:
         """Solve at λ = `p` (inside unit) by Newton's method from `guess` alone."""
@@ -296,14 +328,14 @@ class Workspace:
         forces: Real = system.loose @ (system.shift * point.residual[:: self.balance.n_coefficients])
         return forces
 
-    def _held_in_place(self, p: float, spent: int) -> PointSolution:
+    def _held_in_place(self, p: float, spent: int, guess: Real | None, quick: bool) -> PointSolution:
         """Solve where a constant force holds what no contact does: is the force 0, nothing drives the part.
 
         Under given loads the friction forces of two motions never work on their difference, so the motion of
         a part that needs such a force is no periodic one without it.
         """
         other = self.holding()
-        found = other.solve(p)
+        found = other.solve(p, guess, quick=quick)
         u, spent, good = found.u, spent + found.iterations, found.converged
         failed = PointSolution(
             converged=False, u=u, iterations=spent, residual=np.inf, loses_power=found.loses_power
@@ -344,62 +376,6 @@ class Workspace:
         moved = u.copy()
         moved[::n] += far * way
         return moved
-
-    def _by_level(self, u: Real, p: float, *, at_rest: bool = False) -> tuple[bool, int, float]:
-        """Raise the excitation from nothing, the result in `u`; as `newton`.
-
-        With `at_rest` the constant forces stay, and the static equilibrium under them comes first: what
-        presses and what is open is known before anything moves.
-        """
-        reached, step, spent, norm = 0.0, 0.1, 0, np.inf
-        kept = np.zeros(u.size)
-        if at_rest:
-            self._scaled_receptance(p, 0.0, at_rest=True)
-            stuck_start(self.system, self.linear, p, kept)
-            good, spent, norm = newton(self.system, self.linear, kept, p, 0.0, self.point)
-            if not good:
-                return False, spent, norm
-        while reached < 1.0 and step > _LEAST_RISE:
-            level = min(1.0, reached + step)
-            u[:] = kept * (level / reached) if reached > 0.0 and not at_rest else kept
-            self._scaled_receptance(p, level, at_rest=at_rest)
-            good, more, norm = newton(self.system, self.linear, u, p, 0.0, self.point)
-            spent += more
-            if good:
-                kept, reached, step = u.copy(), level, 1.5 * step
-            else:
-                step *= 0.5
-        receptance(self.system, p, self.linear)
-        return reached == 1.0, spent, norm
-
-    def _scaled_receptance(self, p: float, level: float, *, at_rest: bool) -> None:
-        """Fill the receptance with all forces at a level, or (`at_rest`) all but the constant ones."""
-        receptance(self.system, p, self.linear)
-        linear = receptance_by_value(self.linear)
-        scaled = np.where(self.balance.system.ks > 0, level, 1.0 if at_rest else level)
-        linear.u_linear[...] *= scaled[:, None]
-        linear.x_linear[...] *= scaled
-
-    def _with_fewer_harmonics(self, p: float) -> tuple[Integer, PointSolution]:
-        """Solve with about two thirds of the harmonics, found in the same way from still fewer.
-
-        Returns them and the solution.
-        """
-        count = self.balance.system.ks.size
-        less = fewer_harmonics(self.balance, max(2 * count // 3, FEWEST_HARMONICS))
-        if less.system.ks.size >= count:
-            return self.balance.system.ks, self._nothing()
-        smaller = Workspace.of(less)
-        ks, coarse = smaller._with_fewer_harmonics(p)
-        u, good, norm, spent = np.zeros(smaller.balance.n_unknowns), False, np.inf, coarse.iterations
-        if coarse.converged:
-            good, more, norm = smaller._newton(smaller._padded(coarse.u, ks), u, p)
-            spent += more
-        if not good:
-            good, more, norm = from_stuck(smaller.system, smaller.linear, u, p, smaller.point)
-            spent += more
-        found = PointSolution(converged=bool(good), u=u, iterations=int(spent), residual=float(norm))
-        return less.system.ks, found
 
     def _newton(self, guess: Real, u: Real, p: float) -> tuple[bool, int, float]:
         """Run Newton's method from `guess`, the result in `u`."""

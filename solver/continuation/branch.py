@@ -199,6 +199,7 @@ class BranchStatus(Enum):
     )
     STOPPED = "The continuation was stopped by the caller."
     TOO_MANY_POINTS = "The largest number of points was used up: allow more points or a larger step."
+    TOO_HIGH = "The amplitude is far higher than what it is compared with: the branch was not followed on."
     TOO_STIFF = (
         "A contact is so much stiffer than the structure that what it deforms is lost in the rounding of its "
         "motion: lower kt. Above a million times the structure's stiffness the response no longer depends on "

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.balance.balance import Balance, Kind, build, level_scales_all
+from solver.balance.balance import Balance, Kind, build, level_scales_all, with_harmonics
 from solver.balance.workspace import PointSolution, Workspace
 from solver.continuation.branch import BranchStatus
 from solver.jit.fourier import Real
@@ -28,29 +28,19 @@ MOST_POINTS = 1024  # of the arc; a smooth one takes 70, that of a light wedge s
 
 
 def solve_from_nothing(workspace: Workspace, p: float, guess: Real | None = None) -> PointSolution:
-    """Solve at λ = `p` (inside unit) as `Workspace.solve` does, and where that fails along the level.
+    """Solve at λ = `p` (inside unit) as `Workspace.solve` does, from `guess` if given, the level's arc among
+    its ways."""
+    return workspace.solve(p, guess, by_level)
 
-    Parameters
-    ----------
-    guess : (n_unknowns,) slip motions to start from [m].
 
-    Returns
-    -------
-    The solution, or the attempt without one of `Workspace.solve`; its iterations are those of both ways. A
-    motion that ratchets is not looked for further: there is no periodic one. Nor is one where a contact has
-    no force at the stuck response: the arc creeps towards the level from which on it has none.
+def by_level(workspace: Workspace, p: float) -> tuple[Real | None, int]:
+    """Follow the response at λ = `p` (inside unit) from a small level; see `solver.balance.workspace.Arc`.
+
+    Where a contact has no force at the stuck response the arc would creep towards the level from which on it
+    has none.
     """
-    found = workspace.solve(p, guess)
-    if found.converged or found.ratchets or workspace.law_fails(p):
-        return found
-    balance = _over_level(workspace.balance, p)
-    end, spent = (None, 0) if balance is None else _followed(balance)
-    spent += found.iterations
-    if end is not None:
-        again = workspace.solve_from(p, end)
-        spent += again.iterations
-        found = again if again.converged else found
-    return replace(found, iterations=spent)
+    balance = None if workspace.law_fails(p) else _over_level(workspace.balance, p)
+    return (None, 0) if balance is None else _followed(balance)
 
 
 def _over_level(balance: Balance, p: float) -> Balance | None:
@@ -71,7 +61,10 @@ def _over_level(balance: Balance, p: float) -> Balance | None:
     other = build(
         scene, AMPLITUDE, harmonics=balance.n_harmonics, frequency_hz=frequency_hz, effects=effects
     )  # fmt: skip
-    return other if np.array_equal(other.system.ks, balance.system.ks) else None
+    if not np.all(np.isin(balance.system.ks, other.system.ks)):
+        return None
+    other = with_harmonics(other, balance.system.ks)
+    return replace(other, system=other.system._replace(hold=balance.system.hold))
 
 
 def _followed(balance: Balance) -> tuple[Real | None, int]:

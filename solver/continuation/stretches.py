@@ -245,7 +245,7 @@ def taken_up(
         p = float(last[-1, -1]) + share * span
         if (p - control.stop) * span >= 0.0:
             return None
-        found = workspace.solve(p)
+        found = workspace.solve(p, last[-1, :-1], quick=True)
         if not found.converged:
             continue
         moved = np.abs(found.u.reshape(balance.n_ports, -1)[:, 1:] - before).max()
@@ -266,10 +266,10 @@ def ratchets_ahead(workspace: Workspace, state: walk_states.Walk, control: Contr
     """Return whether there is no periodic motion a little further on because a part drifts away."""
     if not len(workspace.balance.system.loose):
         return False
-    at, span = float(walk_by_value(state).numbers[walk_states.P]), control.stop - control.start
+    here, span = walk_by_value(state), control.stop - control.start
     for share in AHEAD:
-        p = at + share * span
-        if (p - control.stop) * span <= 0.0 and workspace.solve(p).ratchets:
+        p = float(here.numbers[walk_states.P]) + share * span
+        if (p - control.stop) * span <= 0.0 and workspace.solve(p, here.u, quick=True).ratchets:
             return True
     return False
 

@@ -110,6 +110,8 @@ class ContinuationSettings:
         Distance from predicted to corrected point, relative to the step, beyond which a step is halved.
     most_points : int
         Points after which the branch ends with a status.
+    highest : float
+        Amplitude [m] of a point behind which the branch ends: it is compared with less.
     peaks : bool
         Whether peaks and the band are looked for between the points; without them the branch has none.
     unfinished_peaks : bool
@@ -128,6 +130,7 @@ class ContinuationSettings:
     most_iterations: int = 8
     largest_turn: float = 1.0
     most_points: int = 20_000
+    highest: float = math.inf
     peaks: bool = True
     unfinished_peaks: bool = True
     errors: bool = True

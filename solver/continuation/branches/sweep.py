@@ -147,6 +147,9 @@ def _swept(
         count += len(stretch.solutions)
         if course.on_stretch is not None and stretch is not course.resume:
             course.on_stretch(stretch)
+        if stretch.measures[:, MAX_ABS].max(initial=0.0) > settings.highest:
+            status = BranchStatus.TOO_HIGH
+            break
         if stretch.status is not None:
             status = stretch.status
             break
