@@ -384,6 +384,8 @@ class Samples:
             return
         sure = SURE * (self.n + 1)
         begin = list(places(self.n))
+        if self.n == 1:  # from the middle outward: beyond it responses may be far higher than there
+            begin.sort(key=lambda z: abs(float(z[0]) - 0.5))
         self.at(begin[:sure])
         for z in begin[sure:]:
             if self._worth(z):

@@ -9,6 +9,7 @@ from scipy.optimize import minimize_scalar
 import optim
 import solver
 from optim import DesignStatus
+from optim.criteria.evaluation import evaluate
 from optim.problem.design_problem import pose
 from solver import Scene
 
@@ -135,3 +136,51 @@ def test_every_shipped_scene_says_what_is_designed_by_itself(name: str, variable
     (found,) = pose(scene).variables
     value = scene.value(variable)
     assert (found.name, found.low, found.high) == (variable, value / 10.0, value * 15.0)
+
+
+def test_a_response_that_is_lost_from_one_end_is_followed_from_the_other() -> None:
+    scene = solver.load_scene("platform-wedge").with_values({"wedge.mass": 0.0071338})
+    up = solver.sweep(scene, harmonics=11)
+    assert not up.reached
+    found = evaluate(pose(scene), {"wedge.mass": 0.0071338}, gradients=False)
+    assert found.good
+    down = solver.sweep(scene, start=BAND[1], stop=BAND[0], harmonics=11)
+    assert down.peak is not None
+    assert found.peaks[0].value == pytest.approx(down.peak.value, rel=1e-9)
+
+
+def test_a_design_far_above_the_best_is_not_followed() -> None:
+    scene = solver.load_scene("platform-wedge")
+    known = evaluate(pose(scene), {"wedge.mass": 0.012}, gradients=False)
+    assert evaluate(pose(scene), {"wedge.mass": 0.012}, gradients=False, most=1.01 * known.objective).good
+    assert not evaluate(pose(scene), {"wedge.mass": 0.012}, gradients=False, most=0.9 * known.objective).good
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["wedge", "cylinder"])
+def test_the_default_design_of_a_shipped_damper_is_the_best_of_a_grid(name: str) -> None:
+    """By half peak to peak of responses over a grid of masses, both ways, and by marches at its peak."""
+    scene = solver.load_scene(f"platform-{name}")
+    found = optim.design(scene)
+    assert found.status is DesignStatus.AT_BOUND
+    assert found.peak is not None
+    assert found.known is not None
+    assert found.known.measure == "half_peak_to_peak"
+    assert found.optimum[f"{name}.mass"] == pytest.approx(0.06)
+    best = scene.with_values(dict(found.optimum))
+    marched = solver.march(best, frequency_hz=found.peak.at, max_periods=4000)
+    assert marched.half_peak_to_peak == pytest.approx(found.peak.value, rel=1e-3)
+    observed = scene.model_copy(
+        update={"observe": scene.observe.model_copy(update={"measure": "half_peak_to_peak"})}
+    )
+    seen = 0
+    for mass in np.geomspace(0.0016, 0.06, 25):
+        for ends in (BAND, BAND[::-1]):
+            swept = solver.sweep(
+                observed.with_values({f"{name}.mass": float(mass)}), start=ends[0], stop=ends[1],
+                settings=solver.ContinuationSettings(highest=100.0 * found.peak.value),
+            )  # fmt: skip
+            higher = swept.amplitude.max() >= found.peak.value * (1.0 - 1e-9)
+            assert higher or not swept.reached, mass
+            seen += bool(higher)
+    assert seen > 40

