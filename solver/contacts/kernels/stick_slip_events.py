@@ -97,11 +97,12 @@ def _crosses(
     end = hi
     if g_hi <= tol:
         width = hi - lo
-        if slope_lo <= 0.0 or slope_hi >= 0.0:
+        # A stick begins where the function is highest: a slope left there by rounding leads nowhere.
+        if slope_lo <= tol * degree * degree or slope_hi >= 0.0:
             return np.inf
-        # Above neither tangent by more than the curvature allows, |w''| ≤ degree² max|w| (Bernstein).
-        room = 0.5 * (degree * width) ** 2 * tol / ROUNDING
-        if min(g_lo + slope_lo * width, g_hi - slope_hi * width) + room <= tol:
+        # The cubic is no higher than this, and off by no more than |w⁗| ≤ degree⁴ max|w| allows (Bernstein).
+        top = max(g_lo, g_hi) + 4.0 / 27.0 * width * (slope_lo - slope_hi)
+        if top + (degree * width) ** 4 / 384.0 * tol / ROUNDING <= tol:
             return np.inf
         guess = lo + cubic_turn(g_lo, slope_lo, g_hi, slope_hi, width)
         end = bracketed_root(c, s, degree, 1, 0.0, lo, hi, guess, FALLING)
