@@ -25,10 +25,6 @@ _Point = TypeVar("_Point")
 _MOST = 120  # points on the way to a root
 _ASIDE = 1e-3  # share of the bracket that a trial keeps from its ends
 
-_STATIONARY = 1e-11  # dλ/dshare of a fold, relative to that at the points it lies between
-_SMOOTH = 1e-6  # above: it jumps, the fold is a corner where a contact changes its state
-_NARROW = 1e-13  # share of the way
-
 
 def closing_in(
     at: Callable[[float], _Point | None], of: Callable[[_Point], float], before: float, after: float
@@ -134,14 +130,6 @@ def level_up_to(
     return inside
 
 
-class OnArc(Protocol):
-    """A point between two others of a branch, with its tangent by the share of the way between them."""
-
-    @property
-    def tangent(self) -> Real:
-        """Derivative by the share, λ last."""
-
-
 class OnBranch(Protocol):
     """A point of a branch: solution and tangent, λ last."""
 
@@ -152,38 +140,3 @@ class OnBranch(Protocol):
     @property
     def tangent(self) -> Real:
         """Direction of the branch."""
-
-
-_OnArc = TypeVar("_OnArc", bound=OnArc)
-
-
-def fold_between(
-    at_share: Callable[[float], _OnArc | None], left: OnBranch, right: OnBranch
-) -> tuple[_OnArc, bool] | None:
-    """Return the fold between two points of a branch, and whether it is smooth (no corner).
-
-    Around a fold λ goes there and back, so that the motion alone tells how far it is: dλ/dshare is of the
-    share of its chord, and 0 where the motion is the same at both points, which then are one but for
-    rounding, with no fold between them.
-
-    Parameters
-    ----------
-    at_share : the solution at a share of the way, None where there is none.
-    left, right : the points, with dλ of opposite signs.
-    """
-    chord = right.solution[:-1] - left.solution[:-1]
-    length, along = float(chord @ chord), [float(chord @ each.tangent[:-1]) for each in (left, right)]
-    before, after = (
-        float(each.tangent[-1] * (length / by if by != 0.0 else 0.0))
-        for each, by in zip((left, right), along, strict=True)
-    )
-    size = max(abs(before), abs(after))
-    if size == 0.0:
-        return None
-    best: tuple[_OnArc, float] | None = None
-    for point, g, width in closing_in(at_share, lambda point: float(point.tangent[-1]), before, after):
-        if best is None or abs(g) <= best[1]:
-            best = point, abs(g)
-        if abs(g) <= _STATIONARY * size or width <= _NARROW:
-            break
-    return None if best is None else (best[0], best[1] <= _SMOOTH * size)

@@ -32,7 +32,7 @@ from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import evaluation_by_value
 from solver.continuation.bracketing import closing_in, dense_between
 from solver.continuation.branch import Branch
-from solver.continuation.extrema.extrema import MOST_HALVINGS, NEAR_THE_TOP, PREDICTED
+from solver.continuation.extrema.kernels.peak_search import MOST_HALVINGS, NEAR_THE_TOP, PREDICTED
 from solver.continuation.extrema.nodes import share_scales
 from solver.errors import SettingError
 from solver.jit.fourier import Real

@@ -17,8 +17,8 @@ from solver.contacts.kernels.system import DENSE, UTILISED
 from solver.continuation.branch import Branch, BranchStatus, Peak, Points
 from solver.continuation.branches.sweep import surveyed, with_error, with_points
 from solver.continuation.extrema.extrema import Survey
-from solver.continuation.extrema.nodes import NodeSolver, PointRow
-from solver.jit.fourier import Real
+from solver.continuation.extrema.nodes import NodeSolver
+from solver.jit.fourier import Integer, Real
 from solver.jit.timer import clock
 from solver.linear.kernels.receptance import observer_receptance, receptance
 from solver.scene.materials import Haigh
@@ -91,19 +91,20 @@ def highest_peaks(branch: Branch, dofs: Sequence[str]) -> tuple[list[Peak], Bran
     """
     begun = clock()
     workspaces = _workspaces(branch, dofs)
-    solver = NodeSolver(workspaces[0])
     nothing = np.zeros((len(branch.values), branch.balance.n_coefficients))
-    observers = _Observers(solver, workspaces)
-    nodes = solver.nodes_of(Points.of(branch, observed=nothing))
+    solver = NodeSolver(workspaces[0], Points.of(branch, observed=nothing))
+    observers, order = _Observers(solver, workspaces), solver.order
     found: list[Peak] = []
     worst, peaks, certificate = 0, branch.peaks, branch.peak_certificate
     for j in range(len(dofs)):
-        survey = Survey(solver, observers.seen_by(j, nodes), highest_alone=True)
-        nodes = survey.nodes
+        observers.see(j, order)
+        survey = Survey(solver, order, highest_alone=True)
+        order = survey.order
         found.append(survey.peaks[0])
         if j == 0 or found[j].value > found[worst].value:
             worst, peaks, certificate = j, survey.peaks, survey.certificate(completed=True)
-    points = solver.points_of(observers.seen_by(worst, nodes))
+    observers.see(worst, order)
+    points = solver.points_of(order)
     seen = replace(
         branch, balance=workspaces[worst].balance, peaks=peaks, band=None, peak_certificate=certificate,
         error_estimate=math.nan, newton_iterations=branch.newton_iterations + solver.spent,
@@ -137,7 +138,7 @@ def observed_balance(posed: Balance, dof: str, measure: str | Haigh | None = Non
 
 
 class _Observers:
-    """Several observed DOFs at the nodes of one solver, each node measured once for all of them."""
+    """Several observed DOFs at the points of one solver, each point measured once for all of them."""
 
     def __init__(self, solver: NodeSolver, workspaces: Sequence[Workspace]) -> None:
         self._solver, self._workspaces = solver, workspaces
@@ -146,9 +147,9 @@ class _Observers:
         self._x = np.empty((len(workspaces), 0, table.observed.shape[1]))
         self._measures = np.empty((len(workspaces), 0, table.measures.shape[1]))
 
-    def seen_by(self, j: int, nodes: Sequence[PointRow]) -> list[PointRow]:
-        """Return the nodes as DOF number j sees them."""
-        rows, table = self._solver.numbers(nodes), self._solver.table
+    def see(self, j: int, rows: Integer) -> None:
+        """Have rows of the table seen as DOF number j sees them."""
+        table = self._solver.table
         more = len(table.measures) - self._known.size
         if more:
             self._known = np.pad(self._known, (0, more))
@@ -160,7 +161,7 @@ class _Observers:
         self._x[:, new], self._measures[:, new] = _measured(
             self._workspaces, table.solutions[new], table.tangents[new], table.measures[new]
         )
-        return self._solver.observe(self._workspaces[j], nodes, self._x[j, rows], self._measures[j, rows])
+        self._solver.observe(self._workspaces[j], rows, self._x[j, rows], self._measures[j, rows])
 
 
 def _measured(

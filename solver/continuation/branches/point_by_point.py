@@ -20,8 +20,9 @@ import numpy as np
 from solver.balance.balance import Balance
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import DENSE, MODES
-from solver.continuation.branch import BranchStatus
-from solver.continuation.extrema.nodes import NodeSolver, PointRow
+from solver.continuation.branch import ROWS, BranchStatus
+from solver.continuation.extrema.kernels.node_table import PointRow
+from solver.continuation.extrema.nodes import NodeSolver
 from solver.continuation.stretches import Stretch, ending
 from solver.continuation.walk import Pace, walk
 from solver.jit.fourier import Real
@@ -95,7 +96,7 @@ class _Unique:
 
     def __init__(self, workspace: Workspace, before: Stretch, stop: float, span: float) -> None:
         self._workspace, self._stop, self.pace = workspace, stop, _PACE.times(span)
-        self.solver, self.rejected = NodeSolver(workspace), 0
+        self.solver, self.rejected = NodeSolver(workspace, before.first(0)), 0
         last = before.solutions[-1]
         self._onward = float(np.sign(stop - last[-1])) or 1.0
         self._last = self.solver.at(float(last[-1]), [last[:-1]], self._onward)
@@ -158,17 +159,10 @@ def _stretch(
     before: Stretch, nodes: list[PointRow], status: BranchStatus | None, curve: _Unique, begun: float
 ) -> Stretch:
     """Return nodes as points behind others; without the state of a continuation, since there is none."""
+    points = curve.solver.points_of(node.number for node in nodes)
     return Stretch(
-        solutions=_rows([node.solution for node in nodes], before.solutions),
-        tangents=_rows([node.tangent for node in nodes], before.tangents),
-        states=np.array([node.states for node in nodes], np.int64).reshape(-1, before.states.shape[1]),
-        observed=_rows([node.observed for node in nodes], before.observed),
-        measures=_rows([np.array(node.measures) for node in nodes], before.measures),
-        status=status, newton_iterations=before.newton_iterations + curve.solver.spent,
+        **{name: getattr(points, name) for name in ROWS}, status=status,
+        newton_iterations=before.newton_iterations + curve.solver.spent,
         rejected_steps=before.rejected_steps + curve.rejected, stepped_over=before.stepped_over,
         seconds=clock() - begun, walk=np.zeros(0),
     )  # fmt: skip
-
-
-def _rows(rows: list[Real], like: Real) -> Real:
-    return np.array(rows) if rows else np.zeros((0, like.shape[1]))

@@ -27,9 +27,10 @@ from solver.continuation.branch import ROWS, Branch, BranchStatus, Peak, Points,
 from solver.continuation.branches.adaptive_harmonics import sweep_to
 from solver.continuation.branches.point_by_point import is_unique, rows_before_a_turn, walk_by_points
 from solver.continuation.branches.symmetry_breaking import branch_flags
-from solver.continuation.extrema.branch_error import branch_error
+from solver.continuation.extrema.branch_error import branch_error, nothing_damps
 from solver.continuation.extrema.extrema import Survey, band_limit
-from solver.continuation.extrema.nodes import NodeSolver, PointRow
+from solver.continuation.extrema.kernels.node_table import PointRow
+from solver.continuation.extrema.nodes import NodeSolver
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.continuation.kernels import walk_state as walk_states
 from solver.continuation.kernels.pseudo_arclength import begin_walk
@@ -335,9 +336,18 @@ def with_error(branch: Branch, workspace: Workspace | None = None) -> Branch:
         return branch
     follow = None if branch.status is BranchStatus.STOPPED else highest_between
     error = branch_error(workspace or Workspace.of(branch.balance), Points.of(branch), branch.peaks, follow)
-    if error == math.inf:
-        return replace(branch, status=BranchStatus.UNDAMPED, peaks=(), band=None)
-    return replace(branch, error_estimate=error)
+    return _undamped(branch) if error == math.inf else replace(branch, error_estimate=error)
+
+
+def if_damped(branch: Branch) -> Branch:
+    """Return a branch whose error was left out as `with_error` does where nothing damps its highest peak."""
+    if branch.peaks and nothing_damps(Workspace.of(branch.balance), Points.of(branch), branch.peaks[0]):
+        return _undamped(branch)
+    return branch
+
+
+def _undamped(branch: Branch) -> Branch:
+    return replace(branch, status=BranchStatus.UNDAMPED, peaks=(), band=None)
 
 
 def _drive_flags(
@@ -382,7 +392,7 @@ def sampled(
         balance.parameter, low if start is None else start, high if stop is None else stop
     )
     workspace = Workspace.of(balance)
-    solver = NodeSolver(workspace)
+    solver = NodeSolver(workspace, Points(**rows_of(balance, 0)))
     first, last = map(balance.parameter.inside, (start, stop))
     if resonates_undamped(balance, first, last):
         return None
@@ -398,7 +408,8 @@ def sampled(
         if not more:
             return None
         nodes += more
-    branch = without_peaks(balance, solver.points_of(nodes), status, start, stop)
+    rows = solver.points_of([node.number for node in nodes])
+    branch = without_peaks(balance, rows, status, start, stop)
     return replace(
         branch, newton_iterations=solver.spent, seconds=clock() - begun,
         flags=branch_flags(workspace, branch.solutions),
@@ -420,4 +431,4 @@ def _until(solver: NodeSolver, last: PointRow, p: float, intervals: int) -> list
     settings = replace(settings, range_length=settings.range_length / intervals)
     ends = float(outside(last.at)), float(outside(p))
     arc = joined(list(walk_branch(solver.workspace, *ends, settings, last.solution[:-1])))
-    return solver.nodes_of(arc)[1:] if arc.status is BranchStatus.COMPLETED else []
+    return solver.added(arc)[1:] if arc.status is BranchStatus.COMPLETED else []

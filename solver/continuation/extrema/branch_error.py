@@ -214,7 +214,7 @@ def branch_error(
         for peak in _rivals(peaks)
     ]
     estimate = errors[0]
-    if estimate >= peaks[0].value and _nothing_damps(workspace, points, peaks[0]):
+    if estimate >= peaks[0].value and nothing_damps(workspace, points, peaks[0]):
         return math.inf
     if not math.isfinite(estimate):
         return math.nan
@@ -227,7 +227,7 @@ def branch_error(
     return max(estimate, reached - peaks[0].value)
 
 
-def _nothing_damps(workspace: Workspace, points: Points, peak: Peak) -> bool:
+def nothing_damps(workspace: Workspace, points: Points, peak: Peak) -> bool:
     """Return whether no digit of a maximum over the frequency is more than rounding, beside which there are.
 
     Where there are none beside it either, what is observed does not move.
@@ -235,13 +235,12 @@ def _nothing_damps(workspace: Workspace, points: Points, peak: Peak) -> bool:
     parameter = workspace.balance.parameter
     if not peak.interior or parameter.kind is not Kind.FREQUENCY:
         return False
-    every = [(peak.solution, float(parameter.inside(peak.at)), peak.value)]
-    every += [
+    ends = (
         (points.solutions[i, :-1], float(points.solutions[i, -1]), float(np.abs(points.observed[i]).max()))
         for i in (0, -1)
-    ]
-    at_peak, *at_ends = (_is_rounding(workspace, *one) for one in every)
-    return at_peak and not all(at_ends)
+    )
+    at_peak = _is_rounding(workspace, peak.solution, float(parameter.inside(peak.at)), peak.value)
+    return at_peak and not all(_is_rounding(workspace, *end) for end in ends)
 
 
 def _is_rounding(workspace: Workspace, solution: Real, p: float, value: float) -> bool:

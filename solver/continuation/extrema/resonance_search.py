@@ -22,11 +22,13 @@ import numpy as np
 
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS
 from solver.continuation.bracketing import dense_between
+from solver.continuation.extrema.kernels.node_table import share_scales
 from solver.continuation.extrema.kernels.suspects import find_suspects
 from solver.jit.fourier import Complex, Flags, Integer, Real
 
 if TYPE_CHECKING:
-    from solver.continuation.extrema.nodes import NodeSolver, PointRow
+    from solver.continuation.extrema.kernels.node_table import PointRow
+    from solver.continuation.extrema.nodes import NodeSolver
 
 # What a resonance adds to the amplitude, relative to what stands there, from which it is solved for. What
 # stands there counts as this share of the highest point at least.
@@ -63,7 +65,6 @@ class Resonance:
 class Search:
     """What a search did."""
 
-    nodes: Annotated[list[PointRow], "The branch with what was added."]
     solved: Annotated[int, "Resonances that were solved for."] = 0
     left: Annotated[
         list[tuple[float, str]], "Places (λ) where a resonance that matters was not solved for, and why."
@@ -73,27 +74,26 @@ class Search:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Intervals:
-    """Intervals between neighbouring nodes of a branch: P of them, N nodes."""
+    """Intervals between neighbouring points of a branch: P of them, N points."""
 
-    begin: Annotated[Integer, "(P,) which node each begins at."]
-    numbers: Annotated[Integer, "(N,) of the nodes in their table."]
+    begin: Annotated[Integer, "(P,) which point each begins at."]
+    numbers: Annotated[Integer, "(N,) of the points in their table."]
     solutions: Annotated[Real, "(N, nt + 1) motions, λ last."]
     observed: Annotated[Real, "(N, …), see `solver.continuation.branch.Branch`."]
     states: Annotated[Integer, "Likewise."]
-    amplitude: Annotated[Real, "(N,) of the nodes [m]."]
-    at: Annotated[Real, "(N,) λ of the nodes [rad/s]."]
+    amplitude: Annotated[Real, "(N,) of the points [m]."]
+    at: Annotated[Real, "(N,) λ of the points [rad/s]."]
     low: Annotated[Real, "Lower end of each [rad/s], (P,)."]
     high: Annotated[Real, "Upper end [rad/s], (P,)."]
     length: Annotated[Real, "Length [rad/s], (P,)."]
 
     @classmethod
-    def of(cls, nodes: list[PointRow], begin: Integer, solver: NodeSolver) -> _Intervals:
-        rows, table = solver.numbers(nodes), solver.table
-        solutions = table.solutions[rows]
-        at = solutions[:, -1]
+    def of(cls, solver: NodeSolver, begin: Integer) -> _Intervals:
+        table = solver.table
+        rows, at = table.order, table.solutions[table.order, -1]
         low, high = np.minimum(at[begin], at[begin + 1]), np.maximum(at[begin], at[begin + 1])
         return cls(
-            begin=begin, numbers=rows, solutions=solutions, observed=table.observed[rows],
+            begin=begin, numbers=rows, solutions=table.solutions[rows], observed=table.observed[rows],
             states=table.states[rows], amplitude=table.measures[rows, MAX_ABS], at=at, low=low, high=high,
             length=high - low,
         )  # fmt: skip
@@ -113,45 +113,43 @@ class ResonanceSearch:
         self._model = solver.model
         self._added = 0
 
-    def run(self, nodes: list[PointRow]) -> Search:
-        """Search between all neighbours; the list is not changed."""
-        found = Search(nodes=list(nodes))
-        fresh = {id(node) for node in nodes[:-1]}
+    def run(self) -> Search:
+        """Search between all neighbours of the branch, and put what was solved for into it."""
+        found, solver = Search(), self._solver
+        begin = np.arange(solver.order.size - 1)
         for _ in range(MOST_ROUNDS):
-            top = max(node.measures[MAX_ABS] for node in found.nodes)
-            left_of = [j for j, node in enumerate(found.nodes[:-1]) if id(node) in fresh]
-            if not left_of:
-                break
-            wanted = self._wanted(np.array(left_of), top, found)
+            rows = _Intervals.of(solver, begin)
+            top = float(rows.amplitude.max())
+            wanted = self._wanted(rows, top, found)
             if not wanted:
                 break
-            fresh = set()
-            grown: list[PointRow] = []
-            for left, right in pairwise(found.nodes):
-                grown.append(left)
-                inside = self._ladders(left, right, wanted.get(id(left), ()), top, found)
-                fresh |= {id(node) for node in (left, *inside)} if inside else set()
-                grown += inside
-            found.nodes = [*grown, found.nodes[-1]]
+            grown, fresh = list[int](), list[int]()
+            for j, row in enumerate(rows.numbers.tolist()):
+                grown.append(row)
+                if j in wanted:
+                    left, right = solver.nodes(rows.numbers[j : j + 2])
+                    inside = self._ladders(left, right, wanted[j], top, found)
+                    fresh += range(len(grown) - 1, len(grown) + len(inside)) if inside else ()
+                    grown += [node.number for node in inside]
+            solver.follow(np.array(grown))
+            if not fresh:
+                break
+            begin = np.array(fresh)
         else:
-            unsettled = [found.nodes[j] for j in left_of if id(found.nodes[j]) in wanted]
-            found.left += [(node.at, "the search ended before it settled") for node in unsettled]
+            found.left += [(float(rows.at[j]), "the search ended before it settled") for j in wanted]
         return found
 
-    def _wanted(self, begin: Integer, top: float, found: Search) -> dict[int, list[Resonance]]:
-        """Return the resonances that matter in intervals, by the node on the left of them.
-
-        `begin` (P,) are the numbers of the nodes that the intervals begin at.
-        """
+    def _wanted(self, rows: _Intervals, top: float, found: Search) -> dict[int, list[Resonance]]:
+        """Return the resonances that matter in intervals, by the number of the point on the left of them."""
         wanted: dict[int, list[Resonance]] = {}
-        rows = _Intervals.of(found.nodes, begin, self._solver)
         for j, one in self._narrow(rows, *self._unsettled(rows, *np.nonzero(self._suspects(rows, top)))):
-            left, right = found.nodes[begin[j]], found.nodes[begin[j] + 1]
+            here = int(rows.begin[j])
+            left, right = self._solver.nodes(rows.numbers[here : here + 2])
             height, share = self._model.adds(left, right, one)
             stands = max(left.measures[MAX_ABS], right.measures[MAX_ABS])
             matters = share > MOVES or height > MATTERS * max(stands, OF_THE_TOP * top)
             if matters and stands + FEEDBACK * height >= self._competes * top:
-                wanted.setdefault(id(left), []).append(one)
+                wanted.setdefault(here, []).append(one)
             else:
                 found.unseen = max(found.unseen, stands + height)
         return wanted
@@ -258,11 +256,9 @@ class ResonanceSearch:
         return flags
 
     def _ladders(
-        self, left: PointRow, right: PointRow, wanted: list[Resonance] | tuple[()], top: float, found: Search
+        self, left: PointRow, right: PointRow, wanted: list[Resonance], top: float, found: Search
     ) -> list[PointRow]:
         """Return nodes on ladders round resonances between two nodes, and between the rungs."""
-        if not wanted:
-            return []
         low, high = sorted((left.at, right.at))
         rungs: set[float] = set()
         taken: list[Resonance] = []
@@ -307,7 +303,8 @@ class ResonanceSearch:
         allowed = max(PREDICTED * highest, PREDICTED_OF_TOP * top)
         if abs(right.at - left.at) <= 1e-13 * abs(right.at):
             return None, True
-        by_share = self._solver.scales(left, right)
+        ends = left.solution, right.solution, left.tangent, right.tangent
+        by_share = share_scales(*ends, self._solver.least)
         cubics = []
         for value, slope in ((HIGH, HIGH_SLOPE), (LOW, LOW_SLOPE)):
             turn = left.measures[slope] * by_share[0] - right.measures[slope] * by_share[1]

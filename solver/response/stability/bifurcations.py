@@ -29,11 +29,12 @@ from solver.balance.kernels.jacobian import factorise
 from solver.balance.kernels.newton import arc_newton
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
-from solver.continuation.bracketing import fold_between
 from solver.continuation.branch import AnyBranch, Bifurcations, Branch, BranchStatus, Mark, MarkKind, Points
 from solver.continuation.branches.point_by_point import is_unique
 from solver.continuation.branches.sweep import sweep
-from solver.continuation.extrema.nodes import NodeSolver, PointRow
+from solver.continuation.extrema.kernels.node_table import NOWHERE, PointRow
+from solver.continuation.extrema.kernels.peak_search import fold_of
+from solver.continuation.extrema.nodes import NodeSolver
 from solver.continuation.stretches import Course
 from solver.continuation.walk import ContinuationSettings
 from solver.errors import SettingError
@@ -105,8 +106,8 @@ class BranchSigns:
 
     def __init__(self, balance: Balance, points: Points) -> None:
         self.balance, self.workspace = balance, Workspace.of(balance)
-        self.solver = NodeSolver(self.workspace)
-        self.nodes = self.solver.nodes_of(points)
+        self.solver = NodeSolver(self.workspace, points)
+        self.nodes = self.solver.nodes(self.solver.order)
         self._signs: Real | None = None
 
     @property
@@ -132,8 +133,8 @@ class BranchSigns:
 
         for i, (left, right) in enumerate(pairwise(self.nodes)):
             if left.tangent[-1] * right.tangent[-1] < 0.0:
-                fold = fold_between(partial(self.solver.between, left, right), left, right)
-                node, smooth = fold or (left, True)
+                row, smooth = self.solver.run(fold_of, left.number, right.number)
+                node = left if row == NOWHERE else self.solver.nodes([row])[0]
                 marks.append(self.mark(MarkKind.FOLD, node, i, corner=not smooth))
             elif self.signs[i] * self.signs[i + 1] < 0.0:
                 node = self.halved(i, partial(alike, self.signs[i]), _HALVINGS)

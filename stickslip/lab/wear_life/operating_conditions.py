@@ -21,7 +21,7 @@ from solver.contacts.kernels.system import by_reference
 from solver.continuation.branch import Branch
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.kernels.peak_newton import SHARP, climb, find_summit
-from solver.continuation.extrema.kernels.peak_state import (
+from solver.continuation.extrema.kernels.amplitude_hessian import (
     SIGN,
     SPENT,
     new_summit,

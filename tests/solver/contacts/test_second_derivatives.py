@@ -16,15 +16,6 @@ from solver.balance.workspace import Workspace
 from solver.contacts.kernels.coulomb.line_hessian import second_along
 from solver.contacts.kernels.system import by_reference
 from solver.continuation.extrema.kernels.amplitude_hessian import (
-    balance_at,
-    choose_extremum,
-    curvatures_at,
-    find_extremum,
-    observe_at,
-    slopes_at,
-    solve_responses,
-)
-from solver.continuation.extrema.kernels.peak_state import (
     AMPLITUDE,
     CURVE,
     DA_DP,
@@ -32,7 +23,14 @@ from solver.continuation.extrema.kernels.peak_state import (
     SIGN,
     TAU,
     G,
+    balance_at,
+    choose_extremum,
+    curvatures_at,
+    find_extremum,
     new_summit,
+    observe_at,
+    slopes_at,
+    solve_responses,
     summit_numbers,
     summit_step,
 )
@@ -145,7 +143,7 @@ class Response:
         self._tau = float(self.here[TAU])
 
     def at(self, omega: float, p: float) -> np.ndarray:
-        """The numbers of `solver.continuation.extrema.kernels.peak_state` at the solution for (omega, p)."""
+        """The numbers of a summit, see `kernels.amplitude_hessian`, at the solution for (omega, p)."""
         system, summit, u = self._system, self._summit, self._u.copy()
         numbers = summit_numbers(summit)
         for _ in range(20):

@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from solver.contacts.kernels.system import System
-from solver.continuation.extrema.kernels.peak_newton import MOST, SHARP, climb, find_summit, settle
-from solver.continuation.extrema.kernels.peak_state import (
+from solver.continuation.extrema.kernels.amplitude_hessian import (
     AMPLITUDE,
     CORNER,
     CURVE,
@@ -23,6 +22,7 @@ from solver.continuation.extrema.kernels.peak_state import (
     G,
     Summit,
 )
+from solver.continuation.extrema.kernels.peak_newton import MOST, SHARP, climb, find_summit, settle
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
 from solver.jit.lapack import copy_to

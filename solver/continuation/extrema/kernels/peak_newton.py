@@ -14,16 +14,6 @@ import numpy as np
 
 from solver.contacts.kernels.system import System
 from solver.continuation.extrema.kernels.amplitude_hessian import (
-    balance_at,
-    choose_extremum,
-    curvatures_at,
-    find_extremum,
-    observe_at,
-    slopes_at,
-    solve_responses,
-    solve_step,
-)
-from solver.continuation.extrema.kernels.peak_state import (
     AMPLITUDE,
     CORNER,
     CURVE,
@@ -37,6 +27,14 @@ from solver.continuation.extrema.kernels.peak_state import (
     TAU,
     G,
     Summit,
+    balance_at,
+    choose_extremum,
+    curvatures_at,
+    find_extremum,
+    observe_at,
+    slopes_at,
+    solve_responses,
+    solve_step,
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real

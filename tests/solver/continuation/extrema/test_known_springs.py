@@ -31,8 +31,8 @@ def test_springs_of_a_walk_are_those_worked_out_anew() -> None:
     assert again.springs.of(points.solutions)[0] is None
     found = []
     for each in (workspace, again):
-        nodes = NodeSolver(each)
-        rows = nodes.model.rows(nodes.numbers(nodes.nodes_of(points)))
+        nodes = NodeSolver(each, points)
+        rows = nodes.model.rows(nodes.order)
         found.append(nodes.model.stiffness(rows, np.full(rows.size, 3)))
     assert found[0] == pytest.approx(found[1], rel=1e-11, abs=1e-9 * np.abs(found[1]).max())
     # The mean of R⁻¹ (dF/dU) R over all shifts R in time is what commutes with them.

@@ -15,7 +15,7 @@ from solver.balance.kernels.output import MAX_ABS, SLOPE
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Branch, Peak
 from solver.continuation.extrema.extrema import HALF_POWER, band_limit
-from solver.continuation.extrema.kernels.interval_kernels import WORTH_POLISHING
+from solver.continuation.extrema.kernels.node_table import WORTH_POLISHING
 
 HARMONICS = 7
 SCENES = {
