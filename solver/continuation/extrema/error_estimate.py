@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from solver.balance.balance import less_harmonics, linear_part, more_harmonics, pad
 from solver.balance.kernels.haigh import utilisation
-from solver.balance.kernels.jacobian import factorise, step_back
-from solver.balance.kernels.output import extremes, observed_motion
-from solver.balance.kernels.residual import evaluate
+from solver.balance.kernels.output import extremes
 from solver.balance.rounding import observed_rounding
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import (
@@ -25,6 +22,15 @@ from solver.contacts.kernels.system import (
     receptance_by_value,
 )
 from solver.continuation.branch import Branch
+from solver.continuation.extrema.kernels.error_steps import (
+    FIRST,
+    SECOND,
+    change_of,
+    motion_at,
+    step_by,
+    steps_beyond,
+    tangent_at,
+)
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
 from solver.results.told import Piece
@@ -42,8 +48,6 @@ SAFETY = 1.7
 _FIRST_ORDER = 0.1
 _INSTANTS = 512  # of a period, at which the force of a law is compared with that of a finer one
 _NEARER = 2.0 / 3.0  # of the harmonics added: these are looked at without the others too
-# The change of the motion at its worst instant counts with this share: max|x| may change little by accident.
-_ANYWHERE = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -55,22 +59,6 @@ class ErrorEstimate(Piece):
 
 
 UNKNOWN = ErrorEstimate(max_abs=math.nan, half_peak_to_peak=math.nan)
-
-
-class _Seen(NamedTuple):
-    """An observed motion."""
-
-    x: Real  # coefficients
-    high: float  # its largest value
-    low: float  # its least
-
-
-class _Step(NamedTuple):
-    """A Newton step in the balance with more harmonics."""
-
-    place: tuple[Real, float]  # where it leads, (U, λ)
-    length: float  # largest change of the motions of the contacts [m], or of λ
-    change: tuple[float, float]  # of what is measured
 
 
 class ErrorEstimator:
@@ -135,38 +123,35 @@ class ErrorEstimator:
         across : the error across the branch, not that at a fixed λ. It is what counts at a peak: a resonance
             that moves a little in frequency is not wrong in height. At a fold only this one is finite.
         """
-        larger, kept = self._larger, self._workspace.balance
-        before = self._motion(self._workspace, u, p)
-        tangent = self._tangent() if across else np.zeros(self._larger.balance.n_unknowns + 1)
-        if before is None or tangent is None:
+        workspace, larger = self._workspace, self._larger
+        kept, wide = workspace.balance, larger.balance
+        before, tangent = np.empty(kept.n_coefficients), np.zeros(wide.n_unknowns + 1)
+        if not motion_at(workspace.system, workspace.linear, workspace.point, u, p, True, before):
             return UNKNOWN
-        moved = pad(before, kept, larger.balance)
-        x = _Seen(moved, *extremes(larger.system, moved)[::2])
-        used = self._utilisation(x.high, x.low)
-        amplitude, per_motion = (
-            (max(x.high, -x.low), 1.0) if used is None else (used[0], used[1] + abs(used[2]))
-        )
-        U = pad(u, kept, larger.balance)
-        if self._motion(larger, U, p) is None:
+        if across:
+            slope = np.empty(u.size + 1)
+            if not tangent_at(workspace.system, workspace.linear, workspace.point, slope):
+                return UNKNOWN
+            tangent[:-1], tangent[-1] = pad(slope[:-1], kept, wide), 1.0
+        x, U, after = pad(before, kept, wide), pad(u, kept, wide), np.empty(wide.n_coefficients)
+        if not motion_at(larger.system, larger.linear, larger.point, U, p, True, after):
             return UNKNOWN
-        point = evaluation_by_value(larger.point)
-        tail, more = self._tail(point.F, p)
-        rounding = observed_rounding(larger, U, p, across=across)
-        # Across the branch, u and λ each count relative to their size.
-        size = max(float(np.abs(u).max(initial=0.0)), 1e-150)
-        weights = (1.0 / size**2, 1.0 / (p * p if p != 0.0 else 1.0)) if across else (0.0, 0.0)
-        if factorise(larger.system, larger.linear, larger.point, tangent, *weights) == 0.0:
+        tail, more = self._tail(evaluation_by_value(larger.point).F, p)
+        rounding, found = observed_rounding(larger, U, p, across=across), np.empty((3, 3))
+        if not steps_beyond(
+            larger.system, larger.linear, larger.point, U, p, tangent, self._nearer, across, x, found
+        ):
             return UNKNOWN
-        residual = point.residual.copy()
-        part = (residual.reshape(-1, self._nearer.size) * self._nearer).reshape(-1)
-        nearer = self._step(x, U, p, part, across=across)
-        first = self._step(x, U, p, residual, across=across)
-        second = first and self._step(x, *first.place, point.residual, across=across)
         of_laws = self._of_laws(x, U, p, across=across)
-        if nearer is None or first is None or second is None or of_laws is None:
+        if of_laws is None:
             return UNKNOWN
-        largest = np.max([nearer.change, first.change, second.change], axis=0)
-        first_order = second.length <= _FIRST_ORDER * first.length
+        high, _, low, _ = extremes(larger.system, x)
+        amplitude, per_motion = max(high, -low), 1.0
+        if kept.system.centred == UTILISED:
+            amplitude, by_half, by_mean = utilisation(kept.system.haigh, high, low)[:3]
+            per_motion = by_half + abs(by_mean)
+        largest = found[:, :2].max(axis=0)
+        first_order = found[SECOND, 2] <= _FIRST_ORDER * found[FIRST, 2]
         if not (across or first_order) and largest[0] > _FIRST_ORDER * amplitude:
             largest = self._solved(x, U, p, largest)
         changes, rounding = more * SAFETY * largest, per_motion * rounding
@@ -177,7 +162,7 @@ class ErrorEstimator:
             max_abs = half_range
         return ErrorEstimate(max_abs=float(max_abs), half_peak_to_peak=float(half_range))
 
-    def _of_laws(self, x: _Seen, U: Real, p: float, *, across: bool) -> Real | None:
+    def _of_laws(self, x: Real, U: Real, p: float, *, across: bool) -> Real | None:
         """Return the changes by what the laws' own discretisations leave out; None where they lead nowhere.
 
         It is a force beside that of the contacts, put into the balance along the motion found.
@@ -195,95 +180,41 @@ class ErrorEstimator:
                 forces[:, first] = 2.0 / _INSTANTS * (left @ turns.conj())
         forces[system.ks == 0] *= 0.5
         pushed = np.matmul(linear.A[0], forces[:, :, None])[:, :, 0]
-        moved = self._step(x, U, p, self._hat.coefficients(pushed.T).reshape(-1), across=across)
-        if moved is None:
+        larger, moved, found = self._larger, self._hat.coefficients(pushed.T).reshape(-1), np.empty(3)
+        place, after = np.empty(U.size + 1), np.empty(x.size)
+        where = larger.system, larger.linear, larger.point
+        step_by(*where, U, p, moved, across, x, place, found)
+        if not np.isfinite(found[0]) or not motion_at(*where, place[:-1], place[-1], across, after):
             return None
         seen = -self._hat.coefficients((linear.B[0] * forces).sum(axis=1))
-        after = self._motion(self._larger, *moved.place, elsewhere=across)
-        return None if after is None else np.array(self._change(x, after + seen))
+        return np.array(change_of(larger.system, x, after + seen))
 
-    def _step(self, x: _Seen, U: Real, p: float, residual: Real, *, across: bool) -> _Step | None:
-        """Take a Newton step from (U, p) with the matrix at hand; None where it leads nowhere."""
-        larger = self._larger
-        step = np.append(residual, 0.0) if across else residual.copy()
-        step_back(larger.system, larger.point, step)
-        if not np.all(np.isfinite(step)):
-            return None
-        moved = step[: U.size].reshape(-1, larger.balance.n_coefficients)
-        lengths = np.abs(self._hat.of(moved))  # whenever the clock is started
-        length = float(lengths.max(initial=abs(step[-1]) if across else 0.0))
-        place = U - step[: U.size], p - (float(step[-1]) if across else 0.0)
-        after = self._motion(larger, *place, elsewhere=across)
-        return None if after is None else _Step(place, length, self._change(x, after))
-
-    def _solved(self, x: _Seen, U: Real, p: float, largest: Real) -> Real:
+    def _solved(self, x: Real, U: Real, p: float, largest: Real) -> Real:
         """Return the changes of a motion to the solution with more harmonics, or else to that with fewer.
 
         From U on it may not be found where a harmonic added meets a resonance, but from nothing. The latter
         are about those of twice the harmonics, if not more; they count if below `largest`.
         """
-        found = self._larger.solve_from(p, U)
+        larger, after = self._larger, np.empty(x.size)
+        found = larger.solve_from(p, U)
         if not found.converged:
-            found = self._larger.solve(p)
-        wider = self._motion(self._larger, found.u, p) if found.converged else None
-        if wider is not None:
-            return np.array(self._change(x, wider))
+            found = larger.solve(p)
+        if found.converged and motion_at(larger.system, larger.linear, larger.point, found.u, p, True, after):
+            return np.array(change_of(larger.system, x, after))
         fewer = self._with_fewer(p)
-        return largest if fewer is None else np.minimum(largest, self._change(x, fewer))
+        return largest if fewer is None else np.minimum(largest, change_of(larger.system, x, fewer))
 
     def _with_fewer(self, p: float) -> Real | None:
         """Return the observed coefficients of the solution with half of the harmonics; None without."""
         less = less_harmonics(self._workspace.balance, self._workspace.balance.n_harmonics // 2)
         if less.system.ks.size in (0, self._workspace.balance.system.ks.size):
             return None
-        smaller = Workspace.of(less, self._workspace)
+        smaller, x = Workspace.of(less, self._workspace), np.empty(less.n_coefficients)
         found = smaller.solve(p)
-        x = self._motion(smaller, found.u, p) if found.converged else None
-        return None if x is None else pad(x, less, self._larger.balance)
-
-    def _utilisation(self, high: float, low: float) -> tuple[float, float, float] | None:
-        """Return the utilisation of an observed stress with its derivatives; None if it is not measured."""
-        system = self._workspace.balance.system
-        return utilisation(system.haigh, high, low)[:3] if system.centred == UTILISED else None
-
-    @staticmethod
-    def _motion(workspace: Workspace, u: Real, p: float, *, elsewhere: bool = True) -> Real | None:
-        """Return the observed coefficients at (u, p), the evaluation in the workspace; None if it failed."""
-        if elsewhere:
-            receptance(workspace.system, p, workspace.linear)
-        norm = evaluate(workspace.system, workspace.linear, u, p, 0.0, workspace.point)
-        if not math.isfinite(norm):
-            return None
-        x = np.zeros(workspace.balance.n_coefficients)
-        observed_motion(workspace.system, workspace.linear, u, workspace.point, x)
-        return x
-
-    def _change(self, before: _Seen, after: Real) -> tuple[float, float]:
-        """Return the changes of max|x| and of (max x − min x)/2, or twice that of the utilisation.
-
-        They are at least a tenth of those of the motion.
-        """
-        x, high, low = before
-        (high_after, low_after), (rise, sink) = (
-            extremes(self._larger.system, each)[::2] for each in (after, after - x)
+        good = found.converged and motion_at(
+            smaller.system, smaller.linear, smaller.point, found.u, p, True, x
         )
-        max_abs = abs(max(high_after, -low_after) - max(high, -low))
-        half_range = 0.5 * abs(high_after - low_after - high + low)
-        used, now = self._utilisation(high, low), self._utilisation(high_after, low_after)
-        if used is not None and now is not None:
-            least = 0.5 * used[1] * (rise - sink) + abs(used[2]) * max(rise, -sink)
-            return (max(abs(now[0] - used[0]), _ANYWHERE * least),) * 2
-        return max(max_abs, _ANYWHERE * max(rise, -sink)), max(half_range, 0.5 * _ANYWHERE * (rise - sink))
-
-    def _tangent(self) -> Real | None:
-        """Return the tangent of the branch where the workspace was evaluated, λ last; None if singular."""
-        kept = self._workspace
-        slope = -evaluation_by_value(kept.point).dr_dp
-        if factorise(kept.system, kept.linear, kept.point, slope, 0.0, 0.0) == 0.0:
-            return None
-        step_back(kept.system, kept.point, slope)
-        tangent: Real = np.append(pad(slope, kept.balance, self._larger.balance), 1.0)
-        return tangent if np.all(np.isfinite(tangent)) else None
+        return pad(x, less, self._larger.balance) if good else None
 
     def _tail(self, F: Real, p: float) -> tuple[float, float]:
         """Return what harmonics beyond those of the larger balance do.
