@@ -28,7 +28,8 @@ from optim.identification.data.measured_table import Dimension, Table
 from optim.identification.data.response import measured_dof, observing_dof
 from optim.problem.variables import Real
 from solver.continuation.branch import Branch
-from solver.continuation.branches.sweep import sweep
+from solver.continuation.branches.sweep import if_damped, sweep
+from solver.continuation.walk import ContinuationSettings
 from solver.errors import SettingError
 from solver.scene.parameter_paths import AMPLITUDE
 from solver.scene.scene import Scene
@@ -85,7 +86,10 @@ class _PeakModel(RunModel):
         start, stop = self._run.range or (None, None)
         if blades is None:
             seen = observing_dof(scene, self._run.dof)
-            branch = sweep(seen, start=start, stop=stop, harmonics=self._harmonics)
+            settings = ContinuationSettings(errors=False)
+            branch = if_damped(
+                sweep(seen, start=start, stop=stop, harmonics=self._harmonics, settings=settings)
+            )
             return [branch if branch.reached else None] * count
         found = blade_peaks(scene, start, stop, dof=self._run.dof, harmonics=self._harmonics)
         if len(found.branches) != len(found.value):

@@ -22,6 +22,7 @@ from solver.balance.balance import build
 from solver.balance.simplifications import Effects
 from solver.continuation.branches.point_by_point import is_unique
 from solver.continuation.branches.sweep import sweep
+from solver.continuation.walk import ContinuationSettings
 from solver.jit.fourier import Complex
 from solver.results.told import json_numbers
 from solver.scene.scene import Scene
@@ -98,7 +99,10 @@ class ResponseModel(RunModel):
     def _choose_branches(self, scene: Scene, seen: ObservedSensitivities) -> None:
         """Keep the solution nearest to the data of those the branch has at each frequency."""
         low, high = float(self._hertz.min()), float(self._hertz.max())
-        branch = sweep(scene, start=low, stop=high, harmonics=self._harmonics, effects=self._effects)
+        branch = sweep(
+            scene, start=low, stop=high, harmonics=self._harmonics, effects=self._effects,
+            settings=ContinuationSettings(errors=False),
+        )  # fmt: skip
         points = branch.solutions
         for i, hertz in enumerate(self._hertz.tolist()):
             ahead = points[:, -1] - TWO_PI * hertz

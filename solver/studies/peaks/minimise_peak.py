@@ -16,6 +16,7 @@ import numpy as np
 
 from solver.balance.simplifications import Effects
 from solver.continuation.branch import BranchStatus
+from solver.continuation.branches.sweep import with_error
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, OMEGA, Z
 from solver.continuation.walk import Pace
 from solver.errors import SettingError, check_count
@@ -76,8 +77,9 @@ def result_of(
     ends = None if plateau is None else (plateau.low, plateau.high)
     return LeastPeak(
         status=status, at=tracker.scale.outside(best.z), peak=best.height, active=active,
-        basins=tuple(_basin(tracker, one) for one in found), branch=None if look is None else look.branch,
-        sweeps=tracker.sweeps, work=_work(tracker, look), seconds=clock() - begun,
+        basins=tuple(_basin(tracker, one) for one in found),
+        branch=None if look is None else with_error(look.branch), sweeps=tracker.sweeps,
+        work=_work(tracker, look), seconds=clock() - begun,
         plateau=None if ends is None else (tracker.scale.outside(ends[0]), tracker.scale.outside(ends[1])),
         chosen_by=(ChosenBy.HIGHEST_PEAK if plateau is None else plateau.by).value,
     )  # fmt: skip

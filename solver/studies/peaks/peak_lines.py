@@ -16,6 +16,7 @@ import numpy as np
 
 from solver.balance.balance import Balance
 from solver.contacts.kernels.system import System
+from solver.continuation.extrema.kernels.amplitude_hessian import Summit
 from solver.continuation.extrema.kernels.peak_continuation import (
     COLUMNS,
     DHEIGHT,
@@ -29,7 +30,6 @@ from solver.continuation.extrema.kernels.peak_continuation import (
     begin_track,
     step_track,
 )
-from solver.continuation.extrema.kernels.peak_state import Summit
 from solver.jit import fourier
 from solver.jit.fourier import Integer, Real
 

@@ -18,7 +18,7 @@ from solver.balance.balance import build
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Branch, Peak
-from solver.continuation.branches.sweep import sweep, walk_branch
+from solver.continuation.branches.sweep import if_damped, sweep, walk_branch
 from solver.continuation.extrema.extrema import Rival, crests
 from solver.continuation.parameter_scale import scale_of
 from solver.continuation.stretches import Course, Stretch
@@ -197,9 +197,10 @@ def sweep_within(scene: Scene, harmonics: int, effects: Effects | None, allowanc
         return False
 
     try:
-        return sweep(
-            scene, harmonics=harmonics, effects=effects, course=Course(on_stretch=watch), should_stop=stop
-        )
+        return if_damped(sweep(
+            scene, harmonics=harmonics, effects=effects, settings=ContinuationSettings(errors=False),
+            course=Course(on_stretch=watch), should_stop=stop,
+        ))  # fmt: skip
     except _TooLongError:
         settings = ContinuationSettings(peaks=False)
         begun = sweep(

@@ -22,6 +22,14 @@ from solver.contacts.laws.contact_law import without_second
 from solver.continuation.bracketing import dense_between
 from solver.continuation.branch import Peak
 from solver.continuation.extrema.extrema import Rival, rivals
+from solver.continuation.extrema.kernels.amplitude_hessian import (
+    SIGN,
+    SPENT,
+    Summit,
+    new_summit,
+    summit_numbers,
+    summit_seconds,
+)
 from solver.continuation.extrema.kernels.peak_continuation import (
     COLUMNS,
     HEIGHT,
@@ -30,14 +38,6 @@ from solver.continuation.extrema.kernels.peak_continuation import (
     Ridge,
     Z,
     polish,
-)
-from solver.continuation.extrema.kernels.peak_state import (
-    SIGN,
-    SPENT,
-    Summit,
-    new_summit,
-    summit_numbers,
-    summit_seconds,
 )
 from solver.continuation.walk import Pace, walk
 from solver.errors import SettingError
