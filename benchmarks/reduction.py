@@ -75,7 +75,7 @@ def brick() -> tuple[Any, Any, np.ndarray]:
 def _child() -> None:
     """Reduce, and print what it took."""
     from solver.matrices.craig_bampton import craig_bampton
-    from solver.matrices.matrix_validation import DofTable
+    from solver.matrices.values import DofTable
 
     M, K, exact = brick()
     rows = np.linspace(10, M.shape[0] - 5, DOFS).astype(int)

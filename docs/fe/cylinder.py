@@ -21,8 +21,8 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 import stickslip
 from solver.matrices.craig_bampton import craig_bampton
 from solver.matrices.decks.deck import Deck
-from solver.matrices.matrix_validation import DofTable
 from solver.matrices.mortar import mortar
+from solver.matrices.values import DofTable
 
 YOUNG, POISSON, DENSITY, RADIUS, MU = 2.1e11, 0.3, 7850.0, 0.1, 0.4  # N/m², -, kg/m³, m, -
 REDUCED = YOUNG / (2.0 * (1.0 - POISSON**2))  # E* of two equal bodies [N/m²]

@@ -17,7 +17,7 @@ from typing import Annotated
 import numpy as np
 
 from optim.identification.data.measured import MeasuredRows, Predicted
-from optim.methods.surrogate import quasi_random
+from optim.methods.linearised import quasi_random
 from optim.problem.checks import DesignError, is_number
 from optim.problem.variables import (
     BoundedVariable,

@@ -21,8 +21,7 @@ from solver.continuation.branch import Branch
 from solver.continuation.extrema.error_estimate import ErrorEstimator
 from solver.linear.condensation import loose_ports
 from solver.response.solution import MEAN_UNDETERMINED
-from solver.results.known import Known
-from solver.results.measures import HALF_PEAK_TO_PEAK
+from solver.results.known import HALF_PEAK_TO_PEAK, Known
 from solver.results.watch import ShouldStop
 from solver.studies.peaks.peak_lines import fitted
 

@@ -2,7 +2,7 @@
 
 Sampled are corners, middles and a Sobol sequence of designs; local searches begin from those that no
 neighbour beats; then designs are added wherever the slopes of what was seen say that something better than
-the best end may lie (`optim.methods.surrogate`), until nothing does, or a few rounds have found nothing. What
+the best end may lie (`optim.methods.linearised`), until nothing does, or few rounds have found nothing. What
 the local searches found is compared with every design sampled. With several variables half the harmonics
 serve: they only rank designs, by as much as both differ where both were computed, and none of their numbers
 is kept.
@@ -26,20 +26,18 @@ from optim.methods.linearised import (
     Local,
     LocalSearch,
     ModelOf,
+    Taylor,
+    candidates,
     ended,
     is_flat,
     of_limits,
-    standing,
-    without_limits,
-)
-from optim.methods.surrogate import (
-    Taylor,
-    candidates,
     places,
     predicted,
     promising,
     quasi_random,
+    standing,
     taylor_of,
+    without_limits,
 )
 from optim.problem.variables import Real, scaled, snapped, unscaled
 from optim.results.design_result import DesignStatus

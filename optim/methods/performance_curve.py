@@ -18,8 +18,7 @@ from scipy.optimize import minimize, minimize_scalar
 from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.evaluation import evaluate
 from optim.methods.evaluator import SearchStoppedError, stop_if_asked
-from optim.methods.linearised import of_one
-from optim.methods.surrogate import quasi_random
+from optim.methods.linearised import of_one, quasi_random
 from optim.problem.design_problem import Method, Problem
 from optim.problem.variables import BoundedVariable, Real, by_variables, parameter_values, unscaled
 from optim.results.design_result import CurveCheck, DesignResult, DesignStatus

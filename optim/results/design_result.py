@@ -15,8 +15,7 @@ from optim.results.doubts import doubts_of
 from solver.arrays import FloatOrNaN
 from solver.first_use import on_demand
 from solver.results.base import Drawn, MadeOfResponses, Views
-from solver.results.known import Known, Note, Stable, Verdict, notes_of_all, worst
-from solver.results.measures import Measured
+from solver.results.known import Known, Measured, Note, Stable, Verdict, notes_of_all, worst
 from solver.results.told import Piece, json_number
 
 if TYPE_CHECKING:

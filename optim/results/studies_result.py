@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn, MadeOfResponses, Views
-from solver.results.known import NOTHING_DAMPS, Known
-from solver.results.measures import Measured
+from solver.results.known import NOTHING_DAMPS, Known, Measured
 from solver.results.told import Piece
 from solver.scene.scene import Scene
 

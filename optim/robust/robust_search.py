@@ -14,9 +14,8 @@ from typing import Annotated, Any
 from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.peak_criterion import PEAK
 from optim.methods.evaluator import SearchStoppedError, stop_if_asked
-from optim.methods.linearised import KEPT, Local, Model, is_flat, of_limits
+from optim.methods.linearised import KEPT, Local, Model, is_flat, of_limits, quasi_random
 from optim.methods.minimax import REMEMBERED, minimax_search
-from optim.methods.surrogate import quasi_random
 from optim.problem.checks import Aim
 from optim.problem.design_problem import Problem
 from optim.problem.uncertainty_set import Scenario, UncertainSet

@@ -6,8 +6,8 @@ best places seen, a sequential quadratic programme (SLSQP: Kraft, DFVLR-FB 88-28
 worst case inside the set. A finite set is simply tried.
 
 A thorough search looks at the whole set as well: corners, middles of faces and a Sobol sequence, then
-wherever the slopes of what was seen leave room for something worse (`optim.methods.surrogate`), until nothing
-does or a few rounds have found nothing; and it climbs from every place that stands out.
+wherever the slopes of what was seen leave room for something worse (`optim.methods.linearised`), until
+nothing does or a few rounds have found nothing; and it climbs from every place that stands out.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from optim.criteria.criterion import Criterion, CriterionRow
-from optim.methods.surrogate import Taylor, candidates, places, promising
+from optim.methods.linearised import Taylor, candidates, places, promising
 from optim.problem.uncertainty_set import Disk, Scenario, UncertainSet, UncertaintyShape
 from optim.problem.variables import Real
 from optim.robust.scenarios import Outcome

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from service.jobs.kind_registry import Json, NothingToDrawError, ReadSweep, Registry, StoredCurve, StoredSweep
-from solver.results.measures import Measured
+from solver.results.known import Measured
 from solver.views.plots.curves import Response, above, with_peak
 
 if TYPE_CHECKING:

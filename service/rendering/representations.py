@@ -15,7 +15,7 @@ from service.jobs.stored_figures import SweepRecord
 from service.jobs.strict_json import digest
 from service.schemas.answers import SweepDetail
 from solver.results.files import Dataset, csv_text
-from solver.results.measures import OF_X
+from solver.results.known import OF_X
 from solver.scene.parameter_paths import find_parameter, parameter_unit
 from solver.scene.scene import Scene
 from solver.views.io import written

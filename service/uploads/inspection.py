@@ -154,7 +154,7 @@ def _in_folder(asked: tuple[str, str, Any]) -> dict[str, Any]:
 
 def _answer(task: str, argument: Any) -> dict[str, Any]:
     from solver.errors import SceneError
-    from solver.matrices.matrix_files import MatrixFileError
+    from solver.matrices.load_set import MatrixFileError
 
     tasks: dict[str, Callable[[Any], Any]] = {
         _DESCRIBE: lambda names: (_join(*names), _describe(names[0])), _RESOLVE: _resolve,
@@ -173,8 +173,7 @@ def _answer(task: str, argument: Any) -> dict[str, Any]:
 
 
 def _describe(name: str) -> list[dict[str, Any]]:
-    from solver.matrices.load_set import labels_of
-    from solver.matrices.matrix_files import array_names, read_matrix, read_modes
+    from solver.matrices.load_set import array_names, labels_of, read_matrix, read_modes
     from solver.matrices.readers import reader_registry as registry
     from solver.matrices.sectors.sector_reduction import read_sector
 
@@ -216,7 +215,7 @@ def _join(name: str, *parts: str) -> str | None:
 
 def _refuse_inflating(file: Path) -> None:
     """Refuse an archive that holds far more than it is."""
-    from solver.matrices.matrix_files import MatrixFileError
+    from solver.matrices.load_set import MatrixFileError
 
     if not zipfile.is_zipfile(file):
         return

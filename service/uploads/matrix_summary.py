@@ -36,8 +36,7 @@ def look(asked: Mapping[str, Any]) -> dict[str, Any]:
     SceneError with pointers into the scene that is asked for. `asked`: `files` or `structure` (whose keys
     name files of the working directory), and for a scene `name`, `contacts`, `excitation` and `observe`.
     """
-    from solver.matrices.load_set import MatrixSet
-    from solver.matrices.matrix_files import read_modes
+    from solver.matrices.load_set import MatrixSet, read_modes
 
     structure = dict(asked["structure"] or _sorted(asked["files"]))
     report: dict[str, Any] = {"structure": structure, "notes": [], "sets": deck_of(structure)}
@@ -66,7 +65,7 @@ def look(asked: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _sorted(files: list[str]) -> dict[str, Any]:
-    from solver.matrices.matrix_files import sorted_files
+    from solver.matrices.load_set import sorted_files
 
     rest, found = told_apart(files)
     if "diameters" in found:
@@ -283,7 +282,7 @@ def told_apart(files: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
 
     SceneError for more than one deck.
     """
-    from solver.matrices.matrix_files import array_names
+    from solver.matrices.load_set import array_names
     from solver.matrices.readers import reader_registry as registry
 
     decks = [name for name in files if Path(name).suffix.lower() in registry.suffixes("nodes")]
@@ -325,7 +324,7 @@ def reduced_sector(structure: Mapping[str, Any]) -> dict[str, Any]:
 
     SceneError if it is none.
     """
-    from solver.matrices.matrix_files import MatrixFileError
+    from solver.matrices.load_set import MatrixFileError
     from solver.matrices.sectors.sector_reduction import read_sector
 
     try:

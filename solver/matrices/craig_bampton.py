@@ -24,9 +24,8 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 from solver.arrays import Real
 from solver.errors import FieldError
 from solver.matrices.diagnostics import rigid_body_modes
-from solver.matrices.matrix_validation import DofTable, one_triangle
 from solver.matrices.normal_modes import SMALL_PIVOT, least_stiffness, undamped_modes
-from solver.matrices.values import ASYMMETRY, MOST_DOFS, MOST_MODES
+from solver.matrices.values import ASYMMETRY, MOST_DOFS, MOST_MODES, DofTable, one_triangle
 
 Array = NDArray[Any]  # real, or complex where the matrices are Hermitian
 

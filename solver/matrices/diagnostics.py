@@ -14,9 +14,8 @@ from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 from solver.arrays import Real
 from solver.errors import FieldError
 from solver.matrices.load_set import MatrixSet
-from solver.matrices.matrix_validation import one_triangle
 from solver.matrices.sectors.elimination import Elimination
-from solver.matrices.values import ASYMMETRY
+from solver.matrices.values import ASYMMETRY, one_triangle
 
 _RIGID = 1e-3  # a frequency below this share of the next one counts as zero
 _BODY = 6

@@ -11,13 +11,20 @@ from scipy.sparse import coo_array
 
 from solver.errors import UNSAID, FieldError, Issue, SceneError, Shown
 from solver.matrices.craig_bampton import Reduced, craig_bampton
-from solver.matrices.load_set import PART, MatrixSet, in_global, in_si, put_together
-from solver.matrices.matrix_files import MatrixFileError, read_labelled, read_modes
-from solver.matrices.matrix_validation import DofTable
+from solver.matrices.load_set import (
+    PART,
+    MatrixFileError,
+    MatrixSet,
+    in_global,
+    in_si,
+    put_together,
+    read_labelled,
+    read_modes,
+)
 from solver.matrices.readers.numbers_in_text import label
 from solver.matrices.sectors.loading import read_nodes, sector_kept
 from solver.matrices.sectors.sector_reduction import ReducedSector
-from solver.matrices.values import METRES, MOST_DOFS, UNITS, Matrix, NormalModes
+from solver.matrices.values import METRES, MOST_DOFS, UNITS, DofTable, Matrix, NormalModes
 
 KEEP_MODES = "keep_modes"
 MAPPING, IN_UNITS, NODES = "mapping", "units", "nodes"

@@ -31,8 +31,7 @@ from solver.response.contact_response import contact_responses, flags_of
 from solver.response.history_dependence import has_another_solution, history_of
 from solver.response.plausibility import band_end_of
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
-from solver.results.known import ABOVE_FRICTION, Known
-from solver.results.measures import HALF_PEAK_TO_PEAK
+from solver.results.known import ABOVE_FRICTION, HALF_PEAK_TO_PEAK, Known
 from solver.scene.parameter_paths import check_frequency
 from solver.scene.scene import Scene
 

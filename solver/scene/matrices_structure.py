@@ -9,17 +9,19 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from solver.contacts.fields import NonNegative, Part, Vector
-from solver.matrices.matrix_validation import (
+from solver.matrices.sectors.elimination import elimination
+from solver.matrices.sectors.outline import SectorOutline
+from solver.matrices.sectors.sector_parts import DiameterMatrices, PartMatrices
+from solver.matrices.values import (
+    MOST_MODES,
     DofTable,
+    Matrix,
+    NormalModes,
     antisymmetric,
     check_definite,
     check_matrices,
     symmetric,
 )
-from solver.matrices.sectors.elimination import elimination
-from solver.matrices.sectors.outline import SectorOutline
-from solver.matrices.sectors.sector_parts import DiameterMatrices, PartMatrices
-from solver.matrices.values import MOST_MODES, Matrix, NormalModes
 from solver.scene.cyclic.sector_tables import CyclicBoundary, Mistuning, Sectors
 
 _REAL = 1e-9  # imaginary part, relative to the largest entry, that counts as none

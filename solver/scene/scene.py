@@ -25,7 +25,7 @@ from solver.contacts.laws.gap import GapSpring
 from solver.contacts.laws.polynomial import PolynomialSpring
 from solver.errors import Issue, SceneError, SettingError
 from solver.extensions import on_change
-from solver.results.measures import Measured
+from solver.results.known import Measured
 from solver.results.told import Summary, html_of
 from solver.results.units import number
 from solver.scene import parameter_paths as scene_paths

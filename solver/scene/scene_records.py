@@ -32,7 +32,7 @@ from solver.contacts.fields import (
 from solver.contacts.laws.contact_law import AnyContact
 from solver.contacts.laws.law_registry import DEFAULT, laws
 from solver.errors import SettingError
-from solver.results.measures import HALF_PEAK_TO_PEAK
+from solver.results.known import HALF_PEAK_TO_PEAK
 from solver.scene.cyclic.sector_tables import CyclicBoundary as CyclicBoundary
 from solver.scene.cyclic.sector_tables import Mistuning as Mistuning
 from solver.scene.cyclic.sector_tables import Sectors

@@ -21,8 +21,7 @@ from solver.jit.trig_polynomial import grid_size, grid_tables, on_grid
 from solver.response.solution import Solution
 from solver.response.time_history import motion
 from solver.results.base import Data, Drawn, MadeOfResponses, Views
-from solver.results.known import NOTHING_KNOWN, Known
-from solver.results.measures import OF_X, Measured
+from solver.results.known import NOTHING_KNOWN, OF_X, Known, Measured
 from solver.results.watch import shows_progress
 from solver.scene.cyclic.annulus import annulus, sectors_needed
 from solver.scene.parameter_paths import STRUCTURE, named_parts

@@ -23,9 +23,8 @@ from solver.errors import SettingError
 from solver.linear.assembly import linear_model
 from solver.matrices.diagnostics import mass_carried
 from solver.matrices.load_set import MatrixSet
-from solver.matrices.matrix_validation import DofTable
 from solver.matrices.normal_modes import UndampedModes, undamped_modes
-from solver.matrices.values import NormalModes
+from solver.matrices.values import DofTable, NormalModes
 from solver.response.contact_response import contact_responses
 from solver.scene.excitation import AMPLITUDE
 from solver.scene.scene import MatricesStructure, Scene

@@ -12,8 +12,7 @@ import numpy as np
 
 from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Data, Drawn, MadeOfResponses, Shown, Views
-from solver.results.known import NOTHING_DAMPS, NOTHING_KNOWN, Known, Note
-from solver.results.measures import OF_X, Measured
+from solver.results.known import NOTHING_DAMPS, NOTHING_KNOWN, OF_X, Known, Measured, Note
 from solver.results.order_statistics import quantile_json
 from solver.results.told import Piece
 from solver.scene.scene import Scene

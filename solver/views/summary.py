@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.continuation.branch import BranchStatus
 from solver.results import units
-from solver.results.measures import Measured
+from solver.results.known import Measured
 from solver.results.told import Summary
 
 if TYPE_CHECKING:

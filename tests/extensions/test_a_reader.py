@@ -15,7 +15,7 @@ import solver
 from service.cli import main
 from service.client.client import Client
 from solver import extensions
-from solver.matrices.matrix_files import MatrixFileError, read_matrix
+from solver.matrices.load_set import MatrixFileError, read_matrix
 from solver.matrices.readers import reader_registry as registry
 from solver.scene.scene import Scene
 

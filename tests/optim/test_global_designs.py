@@ -28,7 +28,7 @@ from random_designs import (
 import optim
 import solver
 from optim.criteria.peak_criterion import PEAK
-from optim.methods.surrogate import Taylor, corners, places, promising
+from optim.methods.linearised import Taylor, corners, places, promising
 from optim.problem.design_problem import Method, Problem
 from optim.results.design_result import Certainty, DesignResult, DesignStatus
 from optim.robust.robust_result import RobustResult, RobustStatus

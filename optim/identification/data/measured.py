@@ -155,9 +155,7 @@ SHIPPED = (
     "optim.identification.data.response",
     "optim.identification.data.loop",
     "optim.identification.data.mode",
-    "optim.identification.data.decay",
     "optim.identification.data.resonance",
-    "optim.identification.data.measured_peak",
 )
 
 

@@ -18,7 +18,7 @@ from optim.criteria.frequency_ranges import FORBIDDEN
 from optim.criteria.peak_criterion import PEAK
 from solver.jit.fourier import Real
 from solver.results import units
-from solver.results.measures import Measured
+from solver.results.known import Measured
 from solver.results.units import LengthUnit
 from solver.views.plots import style
 from solver.views.plots.curves import Response

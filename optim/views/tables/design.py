@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from solver.results import units
-from solver.results.known import known_pairs, note_pairs, stable_pairs
-from solver.results.measures import Measured
+from solver.results.known import Measured, known_pairs, note_pairs, stable_pairs
 from solver.results.order_statistics import quantile_words
 from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter

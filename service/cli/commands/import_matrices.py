@@ -165,8 +165,7 @@ def _made(
     """Write the scene; return it, its natural frequencies [Hz], what is to be said, and the reduction."""
     import solver
     from solver.matrices.diagnostics import notes
-    from solver.matrices.load_set import MatrixSet
-    from solver.matrices.matrix_files import read_modes
+    from solver.matrices.load_set import MatrixSet, read_modes
 
     found, modes = raw.read.found, raw.read.found.roles.get("modes")
     undamped = "C" not in found.roles and (modes is None or read_modes(modes).damping_ratio is None)

@@ -46,7 +46,7 @@ class Sources:
 
 def sources(asked: ImportOptions) -> Sources:
     """Sort the files given by what they are."""
-    from solver.matrices.matrix_files import MAPPING, MatrixFileError, sorted_files
+    from solver.matrices.load_set import MAPPING, MatrixFileError, sorted_files
     from solver.matrices.values import UNITS
 
     if asked.units not in UNITS:
@@ -88,8 +88,7 @@ def _parts(texts: Sequence[str] | None) -> dict[str, Path | None]:
 
 def read_sources(found: Sources, deck: Path | None) -> MatrixSet | None:
     """The matrices in SI units, along the global axes whatever frames the deck has; None for modes."""
-    from solver.matrices.load_set import PART, in_global, in_si, read_set
-    from solver.matrices.matrix_files import MatrixFileError
+    from solver.matrices.load_set import PART, MatrixFileError, in_global, in_si, read_set
     from solver.matrices.readers.numbers_in_text import FormatError
     from solver.matrices.sectors.loading import read_deck
 
@@ -150,7 +149,7 @@ def _dof(text: str) -> tuple[str, int | str]:
 
 
 def _all_rows(found: Sources, given: MatrixSet | None) -> dict[str, int | str]:
-    from solver.matrices.matrix_files import MatrixFileError, read_modes
+    from solver.matrices.load_set import MatrixFileError, read_modes
 
     if given is not None:
         size = given.size

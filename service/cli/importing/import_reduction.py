@@ -127,7 +127,7 @@ def reduce(
     """Reduce matrices onto the DOFs in `rows` and write them to `path`."""
     from solver.matrices.craig_bampton import craig_bampton, write_reduced
     from solver.matrices.diagnostics import refuse
-    from solver.matrices.matrix_validation import DofTable
+    from solver.matrices.values import DofTable
 
     if (modes is None) == (up_to is None):
         raise InputError(

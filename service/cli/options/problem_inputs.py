@@ -347,7 +347,7 @@ def uploaded(client: Client, body: Mapping[str, Any]) -> dict[str, Any]:
 
 def _labels_beside(structure: Mapping[str, Any], folder: Path) -> Path | None:
     """The file that names the rows, where DOFs are named by node and only its place says so."""
-    from solver.matrices.matrix_files import labels_beside
+    from solver.matrices.load_set import labels_beside
 
     dofs = structure.get("dofs")
     by_node = isinstance(dofs, Mapping) and any(isinstance(row, str) for row in dofs.values())

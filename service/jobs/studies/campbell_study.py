@@ -87,7 +87,7 @@ class Campbell(Study, HarmonicRequest):
         """Return each order with the stored response whose highest peak is its own."""
         from optim.views.plots.figures import campbell_figure
         from service.jobs.drawing import response_of
-        from solver.results.measures import Measured
+        from solver.results.known import Measured
 
         measured = Measured.of_result(result)
         curves = [response_of(read(sweep.id), measured) for sweep in sweeps if sweep.points]

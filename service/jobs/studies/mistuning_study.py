@@ -239,8 +239,7 @@ def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutpu
 def _peaks(part: PartOutput) -> list[BladePeaks]:
     """The peaks that a part found, a disk each."""
     import solver
-    from solver.results.known import Known
-    from solver.results.measures import Measured
+    from solver.results.known import Known, Measured
 
     value, at_hz = (part.arrays[key].array() for key in _OF_THE_PEAKS)
     return [

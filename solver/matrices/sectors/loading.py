@@ -20,14 +20,13 @@ from solver.matrices.decks.deck import DeckFile, frames, positions
 from solver.matrices.decks.keywords import KeywordDeck
 from solver.matrices.decks.nastran import read_nastran
 from solver.matrices.load_set import MatrixSet
-from solver.matrices.matrix_validation import DofTable
 from solver.matrices.readers.numbers_in_text import COMPONENTS, OWN_COMPONENTS, FormatError, Label
 from solver.matrices.readers.reader_registry import MatrixFileError, Reader
 from solver.matrices.sectors.elimination import Elimination, Group, elimination, rotation
 from solver.matrices.sectors.outline import SectorOutline, outline_of
 from solver.matrices.sectors.sector_parts import WHOLE
 from solver.matrices.sectors.sector_reduction import ReducedSector, diameters_met, read_sector, reduce_sector
-from solver.matrices.values import MOST_DOFS, Matrix
+from solver.matrices.values import MOST_DOFS, DofTable, Matrix
 
 _KEYWORDS = re.compile(r"\s*\*\s*(NODE|INCLUDE|PART)\s*(,|$)", re.IGNORECASE)
 _ANSYS = re.compile(r"\s*(NBLOCK|N)\s*,", re.IGNORECASE)

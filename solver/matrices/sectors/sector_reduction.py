@@ -12,11 +12,11 @@ from typing import Annotated, Any
 import numpy as np
 
 from solver.matrices.craig_bampton import Quality, Reduced, craig_bampton
-from solver.matrices.matrix_validation import DofTable
 from solver.matrices.readers.reader_registry import MatrixFileError
 from solver.matrices.sectors.elimination import Elimination, phase_factor
 from solver.matrices.sectors.outline import OutlineMotion, SectorOutline
 from solver.matrices.sectors.sector_parts import DiameterMatrices, PartsAcross
+from solver.matrices.values import DofTable
 
 SUFFIX = ".npz"
 

@@ -13,8 +13,7 @@ from typing import Annotated, Any, TypeVar
 
 from solver.contacts.laws.load_harmonics import is_phase
 from solver.errors import SettingError
-from solver.matrices.matrix_validation import DofTable
-from solver.matrices.values import MOST_DOFS, Matrix
+from solver.matrices.values import MOST_DOFS, DofTable, Matrix
 from solver.results.told import Piece
 from solver.scene.bodies.kinematics import forms_of, written_form
 from solver.scene.cyclic.sector_blocks import (

@@ -11,8 +11,7 @@ from solver.arrays import Real
 from solver.continuation.branch import unsettled
 from solver.errors import SettingError
 from solver.results.base import Data, Drawn, MadeOfResponses, Views
-from solver.results.known import NOTHING_DAMPS, Known
-from solver.results.measures import OF_X, Measured
+from solver.results.known import NOTHING_DAMPS, OF_X, Known, Measured
 from solver.results.told import Piece
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import Real
-from solver.results.measures import OF_X, Measured
+from solver.results.known import OF_X, Measured
 
 if TYPE_CHECKING:
     from solver.continuation.branch import AnyBranch

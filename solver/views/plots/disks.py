@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from solver.jit.fourier import Real
 from solver.results import units
-from solver.results.measures import Measured
+from solver.results.known import Measured
 from solver.views.plots import style
 from solver.views.plots.style import Into
 

@@ -11,7 +11,7 @@ from solver.marching.march_result import MarchResult
 from solver.modes.peaks.performance import PerformanceCurve
 from solver.response.solution import Solution
 from solver.response.stability.multipliers import Stability
-from solver.results.measures import Measured
+from solver.results.known import Measured
 from solver.scene.scene import Scene
 from solver.studies.blades import BladeAmplitudes, BladePeaks
 from solver.views.plots.curves import Response

@@ -13,7 +13,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from solver.arrays import Real
 from solver.results import units
-from solver.results.measures import Measured
+from solver.results.known import Measured
 from solver.views.plots import style
 from solver.views.plots.style import Into
 from solver.views.plots.tracks import numbers

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from solver.arrays import Real
 from solver.results import units
-from solver.results.measures import Measured
+from solver.results.known import Measured
 from solver.scene.parameter_paths import parameter_unit
 from solver.views.plots import style
 from solver.views.plots.curves import Response

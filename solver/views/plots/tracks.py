@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from solver.jit.fourier import Real
 from solver.results import units
-from solver.results.measures import Measured
+from solver.results.known import Measured
 from solver.views.plots import style
 from solver.views.plots.responses import axis_name
 from solver.views.plots.style import Into

@@ -10,13 +10,16 @@ from solver.results import units
 from solver.results.known import (
     BAND_OPEN,
     FLAGS,
+    HALF_PEAK_TO_PEAK,
+    MAX_ABS,
+    WORDS,
+    Measured,
     between_points,
     drift_words,
     flag_words,
     note_pairs,
     stable_pairs,
 )
-from solver.results.measures import HALF_PEAK_TO_PEAK, MAX_ABS, WORDS, Measured
 from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter
 

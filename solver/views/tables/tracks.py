@@ -6,8 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from solver.results import units
-from solver.results.known import known_pairs
-from solver.results.measures import Measured
+from solver.results.known import Measured, known_pairs
 from solver.results.told import Block, ResultTable, Summary
 from solver.scene.parameter_paths import parameter
 from solver.views.tables.responses import proved, title_over

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from solver.results import units
-from solver.results.measures import MAX_ABS, WORDS
+from solver.results.known import MAX_ABS, WORDS
 from solver.views.plots import style
 from solver.views.plots.style import Into
 

@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar
 from solver.arrays import FloatOrNaN, Real
 from solver.results.base import Drawn, MadeOfResponses
 from solver.results.known import Known
-from solver.results.measures import OF_X, Measured
+from solver.results.known import OF_X, Measured
 from solver.results.base import Data, Views
 
 

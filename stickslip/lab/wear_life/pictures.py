@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from solver.results import units
-from solver.results.measures import Measured
+from solver.results.known import Measured
 from solver.views.plots import style
 from solver.views.plots.style import Into
 from solver.views.plots.tracks import numbers

@@ -4,7 +4,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 from solver.results import units
-from solver.results.measures import Measured
+from solver.results.known import Measured
 from solver.results.known import note_pairs
 from solver.results.told import Block, ResultTable, Summary
 

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 
 from solver.arrays import FloatOrNaN
 from solver.results.base import Drawn
-from solver.results.measures import OF_X, Measured
+from solver.results.known import OF_X, Measured
 from solver.results.known import Note
 from solver.results.told import Piece
 from solver.results.base import Data, Views

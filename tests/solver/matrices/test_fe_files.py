@@ -9,8 +9,15 @@ from each import each
 from fe_file_set import NODES, A, files
 from fe_files import abaqus_input, ansys_mapping, dmig, hbmat, op4_binary, op4_text
 
-from solver.matrices.load_set import in_si, read_set
-from solver.matrices.matrix_files import MatrixFileError, array_names, read_labelled, read_labels, read_matrix
+from solver.matrices.load_set import (
+    MatrixFileError,
+    array_names,
+    in_si,
+    read_labelled,
+    read_labels,
+    read_matrix,
+    read_set,
+)
 from solver.matrices.readers.numbers_in_text import FormatError, Label, label
 
 LABELS = tuple(Label(*pair) for pair in ((3, "UX"), (3, "UY"), (8, "UX"), (8, "ROTZ"), (12, "UZ")))

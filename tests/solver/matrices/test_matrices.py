@@ -14,7 +14,7 @@ from scipy.io import mmread, mmwrite, savemat
 
 import solver
 from solver.errors import SceneError, SettingError
-from solver.matrices.matrix_files import MatrixFileError, read_matrix, read_modes
+from solver.matrices.load_set import MatrixFileError, read_matrix, read_modes
 from solver.matrices.readers.matrix_market import read_matrix_market
 from solver.matrices.readers.numbers_in_text import FormatError
 from solver.scene.scene import Scene, load_scene

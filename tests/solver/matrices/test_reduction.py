@@ -16,9 +16,9 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 import solver
 from service.cli import main
 from solver.matrices.craig_bampton import Reduced, craig_bampton, write_reduced
-from solver.matrices.matrix_files import read_matrix
-from solver.matrices.matrix_validation import DofTable
+from solver.matrices.load_set import read_matrix
 from solver.matrices.normal_modes import undamped_modes
+from solver.matrices.values import DofTable
 from solver.scene.scene import load_scene
 
 ROWS = 2 * 350  # above `interior.DENSE`: shift-invert

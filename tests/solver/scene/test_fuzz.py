@@ -19,7 +19,7 @@ from scipy.sparse import coo_array, csc_array, dia_array, save_npz
 
 import solver
 from solver.errors import SceneError
-from solver.matrices.matrix_files import MatrixFileError, array_names, read_matrix, read_modes
+from solver.matrices.load_set import MatrixFileError, array_names, read_matrix, read_modes
 from solver.scene.scene import Scene
 
 MEMORY = 2 * 1024**3

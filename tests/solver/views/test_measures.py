@@ -11,7 +11,7 @@ from each import each
 
 import optim
 import solver
-from solver.results.measures import HALF_PEAK_TO_PEAK, MAX_ABS, WORDS, Measured
+from solver.results.known import HALF_PEAK_TO_PEAK, MAX_ABS, WORDS, Measured
 from solver.results.units import length_unit
 from solver.scene.scene import Scene
 

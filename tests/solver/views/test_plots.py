@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 import solver
 from solver.results import units
 from solver.results.files import whole
-from solver.results.measures import Measured
+from solver.results.known import Measured
 from solver.scene.parameter_paths import parameter
 from solver.views.plots import SUFFIXES, html, style
 from solver.views.plots.curves import Response, above, with_peak
