@@ -259,13 +259,11 @@ def read_response(scene: Scene, table: Table) -> MeasuredRows:
     frequencies = table.columns["frequency"]
     # Frequencies far from those the scene is looked at over are of another unit, most likely.
     low, high = scene.observe.band
-    frequencies = table.columns["frequency"]
     far = np.flatnonzero((frequencies < low / _FAR) | (frequencies > high * _FAR))
     if far.size:
         wanted = (
             f"must be near the scene's band, {low:g} to {high:g} Hz: give the unit in the head of the "
-            f"column, "
-            "`frequency [kHz]`, `[rad/s]` or `[1/min]`"
+            "column, `frequency [kHz]`, `[rad/s]` or `[1/min]`"
         )
         raise table.error(int(far[0]), "frequency", wanted)
     quantity, column, data = _data(table)

@@ -92,8 +92,8 @@ def map_figure(found: Json, *, ax: Into = None) -> Figure:
             ridge = found["ridge"]
             for line in ridge["competing"]:
                 axes.plot(line["frequency"], line["parameter"], color="white", linewidth=0.7, linestyle=":")
-            parameter, frequency = ridge_lines(ridge)
-            axes.plot(frequency, parameter, color="white", linewidth=1.4)
+            along, at = ridge_lines(ridge)
+            axes.plot(at, along, color="white", linewidth=1.4)
             for peak in ridge["optimum"]["active"]:
                 axes.plot([peak["frequency"]], [ridge["optimum"]["at"]], **_DOT)
         if _is_wide(parameter):
