@@ -54,6 +54,12 @@ def test_the_grid_spans_band_and_range(disk: solver.ResponseMap) -> None:
     assert narrow.ridge is None
 
 
+def test_the_picture_spans_the_grid_beyond_the_ridge(disk: solver.ResponseMap) -> None:
+    axes = disk.plot().axes[0]
+    assert axes.get_xlim() == (500.0, 900.0)
+    assert axes.get_ylim() == (20.0, 3000.0)
+
+
 def test_the_ridge_is_above_every_row(disk: solver.ResponseMap) -> None:
     ridge = disk.ridge
     assert ridge is not None
