@@ -521,7 +521,8 @@ def _measure(which: Row, folders: list[Path]) -> tuple[str, ...]:
             off = 0.0 if each is None else abs(each["value"] / ours["value"] - 1.0)
             expect(f"{which.name}: results are {off:.1e} apart", off <= AGREE)
     ratios = [
-        f"{each:.3g}" + (f" ({each / figures[0]:.1f} ×)" if each == each else "") + _responses(answers[-1])
+        (f"{each:.3g} ({each / figures[0]:.1f} ×)" if each == each else f"died or > {PATIENCE:g} s")
+        + _responses(answers[-1])
         for each, answers in zip(figures[1:], found[1:], strict=True)
     ]
     met = "yes" if figures[0] <= which.goal else "no"
