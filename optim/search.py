@@ -162,7 +162,9 @@ def enough_harmonics(problem: Problem, seen: Seen) -> tuple[Problem, Seen]:
         found = again.with_errors()
     if before is not None:  # the measure is another one
         found = by_the_better_known(before, found)
-    if seen.guess and not _known(found):
+    end = found.evaluation
+    # Where the mean of the end is free a minimum of max|x| is none, however well it were known.
+    if seen.guess and end is not None and not (_known(found) or mean_is_free(end)):
         asked = _as_asked(found, seen)
         if asked.evaluation is not None and asked.status is not DesignStatus.STOPPED:
             found = by_the_better_known(asked.with_errors(), found)
