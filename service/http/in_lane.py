@@ -62,9 +62,7 @@ async def prepared(
     settings = context.service.settings
     memory = settings.answer_memory_bytes if task == PREVIEW else settings.worker_memory_bytes or None
     work = context.caller.limits.work
-    words = {
-        "request": request, "body": dict(body), "work": work, "memory": memory, "version": SOLVER_VERSION
-    }  # fmt: skip
+    words = {"request": request, "body": body, "work": work, "memory": memory, "version": SOLVER_VERSION}
     found = await computed(context, task, words)
     return Prepared(**{**found, "spec": JsonText(found["spec"])})
 

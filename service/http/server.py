@@ -16,6 +16,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
@@ -59,13 +60,9 @@ class _Server(uvicorn.Server):
 
 
 class _Opening:
-    """An application that is being loaded: it lives, and what else it is asked waits.
+    """An application that is being loaded, by `load` in a thread: it lives, and what else it is asked waits.
 
-    Parameters
-    ----------
-    settings : of the service.
-    load : gives the application behind these connections; in a thread.
-    ended : called if that, or its beginning or end, went wrong; `trouble` says how then.
+    Where that, its beginning or its end goes wrong `ended` is called, and `trouble` says how.
     """
 
     def __init__(
@@ -73,39 +70,55 @@ class _Opening:
     ) -> None:
         self.state = SimpleNamespace(connections=Connections.of(settings))
         self.trouble: Exception | None = None
-        self._load, self._ended, self._end = load, ended, asyncio.Event()
+        self._load, self._ended = load, ended
         self._app: asyncio.Future[FastAPI]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request; begin and end with the server."""
         if scope["type"] == "lifespan":
-            self._app = asyncio.get_running_loop().create_future()
-            opened = asyncio.create_task(self._open())
-            for event in ("startup", "shutdown"):
-                await receive()
-                if event == "shutdown":
-                    self._end.set()
-                    await opened
-                await send({"type": f"lifespan.{event}.complete"})
+            await self._live(receive, send)
         elif not self._app.done() and scope["path"] == "/health/live":
             await Response(b'{"status":"live"}', media_type="application/json")(scope, receive, send)
         else:
-            await (await asyncio.shield(self._app))(scope, receive, send)
+            await asyncio.wait({self._app})
+            answer = Response(status_code=503) if self._app.cancelled() else self._app.result()
+            await answer(scope, receive, send)
 
-    async def _open(self) -> None:
+    async def _live(self, receive: Receive, send: Send) -> None:
+        made: Future[Any] = Future()
+        self._app, loaded = asyncio.get_running_loop().create_future(), asyncio.wrap_future(made)
+        # Who is told to end meanwhile does not wait for the thread, as for one of a pool.
+        threading.Thread(target=self._make, args=(made,), daemon=True).start()
+        await receive()
+        await send({"type": "lifespan.startup.complete"})
+        ended = asyncio.ensure_future(receive())
+        await asyncio.wait({loaded, ended}, return_when=asyncio.FIRST_COMPLETED)
         try:
-            app = await asyncio.to_thread(self._load, self.state.connections)
-            async with app.router.lifespan_context(app):
-                self._app.set_result(app)
-                await self._end.wait()
+            if not (ended.done() or self._app.cancelled()):
+                app = loaded.result()
+                async with app.router.lifespan_context(app):
+                    self._app.set_result(app)
+                    await ended
         except Exception as error:  # noqa: BLE001 - raised by whoever runs the server
             self.trouble = error
             self._app.cancel()
             self._ended()
+        loaded.cancel()
+        await ended
+        await send({"type": "lifespan.shutdown.complete"})
+
+    def _make(self, made: Future[FastAPI]) -> None:
+        made.set_running_or_notify_cancel()
+        try:
+            made.set_result(self._load(self.state.connections))
+        except Exception as error:  # noqa: BLE001 - as above
+            made.set_exception(error)
 
     def stop_waiting(self) -> None:
-        """End every request that waits for a job."""
-        if self._app.done() and not self._app.cancelled():
+        """The server stops: end every request that waits for a job, or for the application."""
+        if not self._app.done():
+            self._app.cancel()
+        elif not self._app.cancelled():
             self._app.result().state.service.stop_waiting()
 
 
@@ -117,13 +130,14 @@ def serve(settings: Settings, registry: Registry | None = None) -> None:
     """
     logs.configure(settings.log_level, settings.log_format)
     listener = _bind(settings)
+    port = listener.getsockname()[1]
 
     def load(connections: Connections) -> FastAPI:
         from service.http.app import create_app
 
         app = create_app(settings, registry, connections)
         app.state.service.open()
-        log.info("listening on http://%s:%d", settings.host, listener.getsockname()[1])
+        log.info("listening on http://%s:%d", settings.host, port)
         spare_modules()
         give_back_memory()
         threading.Thread(target=_begin_the_rest, args=(app,), daemon=True).start()

@@ -234,13 +234,11 @@ def _one_thread_each() -> Iterator[None]:
 
     It must be in place before the process starts, and this process keeps its own.
     """
-    before = {name: os.environ.get(name) for name in THREAD_LIMITS}
+    before = {name: os.environ[name] for name in THREAD_LIMITS if name in os.environ}
     os.environ.update(THREAD_LIMITS)
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        for name in THREAD_LIMITS.keys() - before.keys():
+            del os.environ[name]
+        os.environ.update(before)

@@ -13,9 +13,9 @@ from typing import Any
 import httpx
 import pytest
 from fastapi import FastAPI
-from launch import COMMAND
+from launch import COMMAND, answers, free_port
 from private_kinds import PRIVATE
-from service_helpers import PATIENCE, MakeSettings
+from service_helpers import PATIENCE, MakeSettings, until
 from test_executor import fork_servers
 from test_previews import WaitRequest, _resolve
 
@@ -128,6 +128,17 @@ def test_a_service_that_cannot_be_loaded_ends_with_the_reason(tmp_path: Path) ->
     assert done.returncode == 2
     assert "not a database" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_service_told_to_end_while_it_is_loaded_ends_at_once_and_well(tmp_path: Path) -> None:
+    port, log = free_port(), tmp_path / "log"
+    words = [*COMMAND, "serve", "--port", str(port), "--database", f"sqlite:///{tmp_path}/jobs.db"]
+    with log.open("w") as stderr:
+        process = subprocess.Popen(words, stderr=stderr)
+        until(lambda: answers(port))
+        process.terminate()
+        assert process.wait(PATIENCE) == 0
+    assert "Traceback" not in log.read_text()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="processes are forked off one on Linux only")

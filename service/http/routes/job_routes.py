@@ -29,7 +29,7 @@ from service.http.dependencies import (
 )
 from service.http.in_lane import prepared, reading
 from service.http.made_once import LargeAnswers
-from service.jobs.kind_registry import KIND, JobRequest, Registry, asked_of
+from service.jobs.kind_registry import KIND, JobRequest, Json, Registry, asked_of
 from service.jobs.kinds.bodies import DESIGN, any_body, design_body, examples, examples_of
 from service.queue.core import Service
 from service.schemas.answers import (
@@ -176,15 +176,11 @@ def submissions(registry: Registry) -> APIRouter:
     return taking
 
 
-async def _submit(
-    context: Context, asked: SubmissionHeaders, body: JobRequest, raw: dict[str, Any]
-) -> Response:
+async def _submit(context: Context, asked: SubmissionHeaders, body: JobRequest, raw: Json) -> Response:
     service, caller = context.service, context.caller
     request = asked_of(body, service.registry.named_in(raw).request)  # a service may have no designs
-    found = await prepared(context, raw, request)
-    row, _ = await service.lanes.writes.run(
-        caller.owner, service.submit, raw, asked.key, caller, (request, found)
-    )
+    checked = request, await prepared(context, raw, request)
+    row, _ = await service.lanes.writes.run(caller.owner, service.submit, raw, asked.key, caller, checked)
     headers = {"Location": f"/v1/jobs/{row.id}"}
     answer = partial(_job_or_result, service, headers)
     if asked.seconds is not None:
