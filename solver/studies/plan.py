@@ -205,8 +205,7 @@ def _leading(balance: Balance) -> tuple[_Said, ...]:
         return ((name, True, reason),)
     reason = (
         f"all {ports} follow from {leading} of them, those of modes and bodies: a step is solved for "
-        f"{leading * balance.n_coefficients} instead of {balance.n_unknowns} unknowns (exact); second "
-        "derivatives and tracked peaks take all of them"
+        f"{leading * balance.n_coefficients} instead of {balance.n_unknowns} unknowns (exact)"
     )
     return ((name, False, reason),)
 

@@ -263,22 +263,11 @@ def new_receptance(system: System) -> Receptance:
 
 @compiled
 def new_evaluation(system: System) -> Evaluation:
-    """Return empty arrays for `evaluate`; without a whole Jacobian where ports are spanned by fewer."""
-    return _new_evaluation(system, is_spanned(system))
-
-
-@compiled
-def new_whole_evaluation(system: System) -> Evaluation:
-    """Return empty arrays for `evaluate` with a receptance of all ports, spanned or not."""
-    return _new_evaluation(system, False)
-
-
-@compiled
-def _new_evaluation(system: System, spanned: bool) -> Evaluation:
-    """Return empty arrays, for factors in the leading ports alone if `spanned`.
+    """Return empty arrays for `evaluate`, for factors in the leading ports alone where they span all.
 
     The large ones are not set to zero: of many contacts that stick most of their memory is never touched.
     """
+    spanned = is_spanned(system)
     ne, nc, n, nk = system.laws.size, system.owner.size, coefficient_count(system.ks), system.ks.size
     blocks, nt, rigid = system.first_block[ne], nc * n, system.loose.shape[0]
     r = system.leading.size if spanned else 0

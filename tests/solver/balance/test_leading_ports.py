@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from many_contacts import nodes_on_modes, parallel_sliders, wedge_of_points
 
-from solver import Effects, Scene, load_scene, march, plan, solve, sweep
+from solver import Effects, Scene, load_scene, march, plan, solve, sweep, track_peak
 from solver.balance.balance import build
 from solver.balance.kernels.jacobian import factorise, step_back, step_back_transposed
 from solver.balance.workspace import Workspace
@@ -204,6 +204,22 @@ def test_branches_are_the_same() -> None:
     assert other.peak is not None
     assert one.peak.value == pytest.approx(other.peak.value, rel=1e-10)
     assert one.peak.at == pytest.approx(other.peak.at, rel=1e-9)
+
+
+@pytest.mark.parametrize("law", ["elastic-normal", "coulomb-3d"])
+def test_tracked_peaks_are_the_same(law: str) -> None:
+    """Their steps are solved for in the leading motions, second derivatives and all."""
+    scene = nodes_on_modes(0, law=law)
+    level = scene.excitation[0].amplitude
+    one, other = (
+        track_peak(scene, "excitation.amplitude", level, 1.5 * level, harmonics=3, checks=1, effects=effects)
+        for effects in (None, EVERY)
+    )
+    for track in (one, other):
+        assert track.reached
+    for kind in ("peak", "frequency", "slope"):
+        few, every = (getattr(track, kind)[[0, -1]] for track in (one, other))
+        np.testing.assert_allclose(few, every, rtol=1e-7 if kind == "slope" else 1e-9)
 
 
 def test_the_march_agrees() -> None:

@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from solver.balance.kernels.coordinates import is_reduced
 from solver.balance.kernels.jacobian import factorise, step_back, step_back_transposed
 from solver.balance.kernels.output import extremes
 from solver.balance.kernels.residual import contact_values, least_size
@@ -41,7 +42,9 @@ from solver.contacts.kernels.system import (
     Evaluation,
     Receptance,
     System,
-    new_whole_evaluation,
+    is_spanned,
+    new_evaluation,
+    new_receptance,
     receptance_over,
 )
 from solver.jit.decorators import compiled
@@ -62,7 +65,7 @@ class Summit(NamedTuple):
     """Everything at one (u, ω, p); nt unknowns, ne elements with nc ports in all, n coefficients each."""
 
     jets: Jets
-    linear: Receptance  # the first two orders of the jets
+    linear: Receptance  # the first two orders of the jets; where fewer ports lead, the first of those alone
     point: Evaluation  # what the factors of the condensed Jacobian are made of
     F: Real  # (nc, n) forces less shift · u
     dF_dU: Real  # (blocks, n, n) slopes of the forces themselves; those of `point`
@@ -97,8 +100,10 @@ def new_summit(system: System) -> Summit:
     ne, nc, n = system.laws.size, system.shift.size, coefficient_count(system.ks)
     nt, m, columns = nc * n, coefficient_count(system.load_ks), system.contacts.shape[1]
     capacity = segment_capacity(max(system.ks[-1], system.load_ks[-1]))
-    jets, point = new_jets(system), new_whole_evaluation(system)
+    jets, point = new_jets(system), new_evaluation(system)
     linear = receptance_over(jets.A, jets.u_linear, jets.B, jets.x_linear)
+    if is_spanned(system):
+        linear = new_receptance(system)
     return _new(
         jets, linear, point, np.zeros((nc, n)), point.dF_dU, np.zeros((nc, n)), np.full(ne, -1, np.int64),
         np.zeros((ne, n, m)), np.zeros((ne, n)), np.zeros((ne, n)), np.zeros(ne, np.int64),
@@ -268,6 +273,11 @@ def balance_at(system: System, u: Real, omega: float, p: float, at: Summit) -> f
     for i in range(system.ks.size):
         if not math.isfinite(at.jets.x_linear[0, i].real):
             return np.nan
+    if is_reduced(system, at.linear):
+        for i in range(system.ks.size):
+            for a in range(system.leading.size):
+                for b in range(system.leading.size):
+                    at.linear.A[0, i, a, b] = at.jets.A[VALUE, i, system.leading[a], system.leading[b]]
     table, load, slope, dload = contact_values(system, p, 0.0)
     copy_block(at.table, table)
     copy_block(at.load, load)
