@@ -149,8 +149,7 @@ def test_options_of_the_local_command_keep_their_words() -> None:
     """Every option of `stickslip KIND` that stands for a key is one of `stickslip submit KIND`."""
     own = {"plot", "out", "as_json", "accuracy", "effects", "report", "uncertain", "column"}
     for one in SHIPPED:
-        local = submit._local(one.name)
-        assert local is not None, one.name
+        local = submit.TOP[one.name].function()
         known = {flag: param for flag, param in submit.options_of(local).items() if param.name not in own}
         made = submit.options_of(submit.submission(one, local))
         assert {flag: made[flag].annotation for flag in known} == {

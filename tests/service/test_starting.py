@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from types import SimpleNamespace
@@ -98,6 +99,9 @@ def test_a_server_lives_while_its_service_is_loaded(make_settings: MakeSettings)
     server, listener = _Server(_config(opening, settings), opening), _bind(settings)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
     thread.start()
+    end = time.monotonic() + PATIENCE
+    while not server.started and time.monotonic() < end:
+        time.sleep(0.01)
     try:
         with httpx.Client(base_url=f"http://localhost:{listener.getsockname()[1]}") as client:
             assert client.get("/health/live", timeout=PATIENCE).json() == {"status": "live"}

@@ -29,7 +29,7 @@ BESIDES = {
 }  # fmt: skip
 # Keys that Python takes otherwise: as one of three words, as a pair, or by a function of its own.
 OTHERWISE: Mapping[str, set[str]] = {
-    "controlled": {"no_stability"}, "march": {"history"}, "solve": {"every", "certify"},
+    "controlled": {"no_stability"}, "march": {"history"}, "solve": {"every", "certify", "multipliers"},
     "peaks": {"certify"}, "design": {"certify", "options"}, "sweep": {"multipliers", "switched"},
     "quasi-periodic": {"to_hz"}, "posterior": {"varied", "assemblies", "models"},
     "wear": {"parameter", "start", "stop", "factors"},

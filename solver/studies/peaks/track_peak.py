@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from solver.balance.simplifications import Effects
+from solver.continuation.branches.sweep import with_error
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, OMEGA, Z
 from solver.errors import check_count
 from solver.jit.fourier import Real
@@ -131,7 +132,7 @@ def _result(tracker: Tracker, best: LeastPeak, status: TrackStatus, forward: boo
         scene=balance.scene.name, parameter_path=balance.parameter.path, unit=balance.parameter.unit,
         parameter=parameter, peak=peak, frequency=frequency, slope=slope, optimum=best,
         competing=tuple(_competing(tracker, line, forward) for line in tracker.lines), exchanges=exchanges,
-        branches=tuple(look.branch for look in tracker.looks), n_harmonics=balance.n_harmonics,
+        branches=tuple(with_error(look.branch) for look in tracker.looks), n_harmonics=balance.n_harmonics,
         sweeps=tracker.sweeps, status=status,
         seconds=clock() - begun, given=balance.scene,
     )  # fmt: skip
