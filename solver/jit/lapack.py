@@ -163,6 +163,15 @@ else:
 
 
 @compiled
+def are_finite(values: Real) -> bool:
+    """Return whether no entry of a vector is NaN or infinite."""
+    total = 0.0
+    for value in values:
+        total += 0.0 * value
+    return total == 0.0
+
+
+@compiled
 def copy_to(target: Real, source: Real) -> None:
     """Copy a vector."""
     for i in range(target.size):

@@ -21,6 +21,7 @@ from service.jobs.common.study_keys import (
 from service.jobs.kind_registry import Flag
 from service.jobs.study import Answer, Study, Watch
 from solver.errors import Issue, Naming, Shown
+from solver.first_use import on_demand
 from solver.response.stability import MOST_STARTS
 from solver.scene.descriptions import DAMPER_LOAD
 
@@ -115,7 +116,6 @@ class Solve(Study, HarmonicRequest):
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:
         """Solve the balance, once or from many starts: the answer is then the largest solution, with all."""
         import solver
-        from solver.response.stability.multipliers import verdict_of
 
         given = with_effects(asked)
         search = {key: given.pop(key) for key in ("starts", "seed") if key in given}
@@ -123,7 +123,8 @@ class Solve(Study, HarmonicRequest):
         if not given.pop("every", False):
             one = solver.solve(scene, **given)
             plain = one if one.converged else None
-            stable = verdict_of(solver.stability(one)).to_json() if judged and one.converged else {}
+            judge = "solver.response.stability.multipliers:verdict_of" if judged and one.converged else ""
+            stable = on_demand(judge)(solver.stability(one)).to_json() if judge else {}
             answer = Answer(plain, one.to_json() | stable, one.reached, one.status.value, one.plot)
             if not proof or not one.converged:
                 return answer

@@ -13,6 +13,7 @@ from solver.balance.kernels.residual import evaluate
 from solver.contacts.kernels.system import UTILISED, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Flags, Real, coefficient_count, cosine_position
+from solver.jit.lapack import are_finite
 from solver.jit.separate import apart
 from solver.linear.kernels.receptance import receptance
 
@@ -91,7 +92,7 @@ def step_by(
         place[i] = u[i] - step[i]
     place[n], found[2] = p - step[n], max(_largest_motion(system, step), abs(step[n]))
     found[0], found[1] = math.nan, math.nan
-    if math.isfinite(step.sum()) and motion_at(system, linear, point, place[:n], place[n], across, after):
+    if are_finite(step) and motion_at(system, linear, point, place[:n], place[n], across, after):
         found[0], found[1] = change_of(system, x, after)
 
 
@@ -129,7 +130,7 @@ def steps_beyond(
     step_by(system, linear, point, u, p, residual, across, x, place, found[FIRST])
     u, p = place[:n].copy(), place[n]
     step_by(system, linear, point, u, p, point.residual.copy(), across, x, place, found[SECOND])
-    return bool(np.isfinite(found.sum()))
+    return are_finite(found[NEARER]) and are_finite(found[FIRST]) and are_finite(found[SECOND])
 
 
 @apart
@@ -142,4 +143,4 @@ def tangent_at(system: System, linear: Receptance, point: Evaluation, tangent: R
         tangent[i] = -point.dr_dp[i]
     tangent[n] = 1.0
     step_back(system, point, tangent[:n])
-    return bool(np.isfinite(tangent.sum()))
+    return are_finite(tangent)

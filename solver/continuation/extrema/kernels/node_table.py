@@ -23,6 +23,7 @@ from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Flags, Integer, Real
 from solver.jit.kernel_records import referenced
+from solver.jit.lapack import are_finite
 from solver.jit.separate import apart
 from solver.linear.kernels.receptance import receptance
 
@@ -417,15 +418,6 @@ def with_inside(order: Integer, inside: Integer) -> Integer:
                 grown[length] = inside[j, k]
                 length += 1
     return grown[:length].copy()
-
-
-@compiled
-def are_finite(values: Real) -> bool:
-    """Return whether no entry is NaN or infinite."""
-    total = 0.0
-    for value in values:
-        total += 0.0 * value
-    return total == 0.0
 
 
 @apart

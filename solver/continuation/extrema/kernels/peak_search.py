@@ -20,7 +20,6 @@ from solver.continuation.extrema.kernels.node_table import (
     Look,
     Nodes,
     add_row,
-    are_finite,
     aside,
     between_rows,
     curve,
@@ -38,6 +37,7 @@ from solver.continuation.extrema.kernels.node_table import (
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Flags, Integer, Real
+from solver.jit.lapack import are_finite
 from solver.jit.separate import apart
 
 _SHARP_RESIDUAL = 2e-11  # of a peak; what is above was accepted because arcs allowed no better
