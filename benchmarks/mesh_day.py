@@ -45,7 +45,8 @@ def mesh_of(day: str) -> tuple[Path, int]:
     """The folder with the matrices of a day, made once, and the number of its nodes."""
     folder = Path(tempfile.mkdtemp(prefix=f"mesh-{day}-"))
     made = runpy.run_path(str(FACE))
-    _, nodes, _ = made["write"](folder, made["SIZES"][DAYS[day][0]])
+    with contextlib.redirect_stdout(io.StringIO()):
+        _, nodes, _ = made["write"](folder, made["SIZES"][DAYS[day][0]])
     return folder, nodes
 
 
