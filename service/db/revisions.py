@@ -35,7 +35,10 @@ def _config() -> Config:
 
 def head_revision() -> str:
     """The revision this version works with: the name of its file begins with it."""
-    return max(file.name for file in (_MIGRATIONS / "versions").glob("[0-9]*.py")).partition("_")[0]
+    files = [file.name for file in (_MIGRATIONS / "versions").glob("[0-9]*.py")]
+    if not files:
+        raise DatabaseError("the package `migrations` has no revisions: the installation is damaged")
+    return max(files).partition("_")[0]
 
 
 def _current(connection: Connection) -> tuple[str | None, bool]:

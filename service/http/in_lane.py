@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from service.errors import InvalidRequestError, issues_to_json
 from service.http.dependencies import Context
 from service.jobs.answering import PREVIEW, RESOLVE, Prepared
-from service.jobs.kind_registry import JobRequest, SceneSource
+from service.jobs.kind_registry import JobRequest, Json, SceneSource
 from service.jobs.strict_json import JsonText
 from service.queue.core import SOLVER_VERSION
 from service.queue.lanes import Lane, Lanes
@@ -55,9 +55,7 @@ async def computed(context: Context, task: str, words: Mapping[str, Any], about:
     raise RuntimeError(f"the task {task!r} looks up more than {_MOST_LOOKED_UP} scenes")
 
 
-async def prepared(
-    context: Context, body: Mapping[str, Any], request: JobRequest, task: str = RESOLVE
-) -> Prepared:
+async def prepared(context: Context, body: Json, request: JobRequest, task: str = RESOLVE) -> Prepared:
     """What a body asks for, a job or a preview, which was checked, resolved; `computed` lists the errors."""
     settings = context.service.settings
     memory = settings.answer_memory_bytes if task == PREVIEW else settings.worker_memory_bytes or None

@@ -11,12 +11,13 @@ import earlier_revisions
 import pytest
 import sqlalchemy as sa
 from alembic import command
+from alembic.script import ScriptDirectory
 
 from service.db import revisions
 from service.db.engine import database_path, is_sqlite, migrating
 from service.db.models import JobState
 from service.db.repositories.integrity import check
-from service.errors import WrongRevisionError
+from service.errors import DatabaseError, WrongRevisionError
 from service.queue.core import Service
 from service.settings.settings import load_settings
 
@@ -62,6 +63,16 @@ def down(url: str, revision: str) -> None:
     with migrating(url) as connection:
         config.attributes["connection"] = connection
         command.downgrade(config, revision)
+
+
+def test_the_head_is_the_one_that_alembic_finds() -> None:
+    assert revisions.head_revision() == ScriptDirectory.from_config(revisions._config()).get_current_head()
+
+
+def test_an_installation_without_revisions_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(revisions, "_MIGRATIONS", tmp_path)
+    with pytest.raises(DatabaseError, match="the installation is damaged"):
+        revisions.head_revision()
 
 
 def test_up_down_and_up_again_keeps_every_row(old: str) -> None:

@@ -116,9 +116,8 @@ def reduced_file(asked: ImportOptions, target: Path) -> Path:
     from solver.matrices.craig_bampton import WRITTEN
 
     name = asked.reduced or str(target.with_name(f"{target.stem}-reduced.npz"))
-    return new_file(
-        "--reduced", name, (".npz",) if asked.sectors is not None or asked.for_contacts else WRITTEN
-    )
+    arrays = asked.sectors is not None or asked.for_contacts
+    return new_file("--reduced", name, (".npz",) if arrays else WRITTEN)
 
 
 def reduce(
