@@ -4,8 +4,12 @@ Peak: at a maximum over the frequency ∂a/∂ω = 0, so its derivative by a par
 (envelope theorem). At an end of the band the frequency does not move either, so the same holds; where a
 contact changes its state at the top, the two smooth pieces that meet there give it
 (`solver.sensitivity.nonsmooth`). Band edge: a(ω_e, p) = limit, so dω_e/dp = (dlimit/dp − ∂a/∂p)/(∂a/∂ω). An
-interval that ends in a fold moves with it, whatever the limit does: the ratio of both derivatives at the fold
-(`solver.continuation.bracketing`). The second derivatives are those of `solver.sensitivity.gradient`.
+interval that ends in a fold, where the branch turns back, moves with it, whatever the limit does: with y the
+left null vector of dr/du there, dλ/dp = −(yᵀ ∂r/∂p) / (yᵀ ∂r/∂λ) (W. Govaerts, Numerical Methods for
+Bifurcations of Dynamical Equilibria, 2000, chapter 3, doi:10.1137/1.9780898719543). The adjoint of any
+quantity that is not stationary at the fold points along y, the more so the closer to it, so that dλ/dp is
+minus the ratio of its derivatives by p and by λ. The second derivatives are those of
+`solver.sensitivity.gradient`.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from solver.results.watch import OnProgress, ShouldStop
 
 MOST_EVALUATIONS = 800
 SEARCHED = 0.75  # share of the progress that the search has
-FAR_ABOVE = 20.0  # times the best, from where on no model leads below it: see `surrogate.MOST_GROWTH`
+FAR_ABOVE = 20.0  # times the best, from where on no model leads below it: see `linearised.MOST_GROWTH`
 USUAL = 12.0  # evaluations of a usual search; how many are left is not known beforehand
 
 

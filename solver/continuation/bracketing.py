@@ -1,25 +1,13 @@
-"""What lies between two points of a curve, however they are solved for: roots, extrema, folds, how it runs.
+"""What lies between two points of a curve, however they are solved for: roots, extrema, how it runs.
 
 A slope that changes its sign is a root; where slopes are known an extremum is looked for as that.
-
-A branch turns back where the parameter is stationary along the arc, dλ/ds = 0. An interval in which the
-amplitude exceeds a limit may end there. Such an end moves with the fold, not with
-the limit: with y the left null vector of dr/du at the fold,
-
-    dλ/dp = −(yᵀ ∂r/∂p) / (yᵀ ∂r/∂λ)
-
-(W. Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, 2000, chapter 3,
-doi:10.1137/1.9780898719543). The adjoint of any quantity that is not stationary there points along y,
-the more so the closer to the fold, so that dλ/dp is minus the ratio of its derivatives by p and by λ.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Protocol, TypeVar
-
-from solver.jit.fourier import Real
+from typing import TypeVar
 
 _Point = TypeVar("_Point")
 _MOST = 120  # points on the way to a root
@@ -128,15 +116,3 @@ def level_up_to(
             break
         inside, outside = (middle, outside) if holds(middle) else (inside, middle)
     return inside
-
-
-class OnBranch(Protocol):
-    """A point of a branch: solution and tangent, λ last."""
-
-    @property
-    def solution(self) -> Real:
-        """Motions [m], λ last."""
-
-    @property
-    def tangent(self) -> Real:
-        """Direction of the branch."""

@@ -1,9 +1,9 @@
 """The utilisation of a recovered stress at the worst mean that contacts which stick all the time may hold.
 
 Where the mean of a response depends on how it began (`MEAN_UNDETERMINED`), a stress is judged by the largest
-mean that is possible, the upper end of `held_contacts.mean_range`. A band is run through: what slips at one
-of its frequencies may hold anything at the others, and so may all that sticks where the flag is set at the
-peak, or where contacts have the least room. Else a start from rest leads to the mean that was found, but
+mean that is possible, the upper end of `contact_response.mean_range`. A band is run through: what slips at
+one of its frequencies may hold anything at the others, and so may all that sticks where the flag is set at
+the peak, or where contacts have the least room. Else a start from rest leads to the mean that was found, but
 another may not: of a mean load that stuck contacts hold there any part may be lost, and a stress is judged by
 the largest mean without it. Half peak to peak is the same of all.
 

@@ -32,8 +32,8 @@ from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import evaluation_by_value
 from solver.continuation.bracketing import closing_in, dense_between
 from solver.continuation.branch import Branch
+from solver.continuation.extrema.kernels.node_table import share_scales
 from solver.continuation.extrema.kernels.peak_search import MOST_HALVINGS, NEAR_THE_TOP, PREDICTED
-from solver.continuation.extrema.nodes import share_scales
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
@@ -159,7 +159,7 @@ class _MaximaSearch:
         for left, right in zip(self._nodes[:-1], self._nodes[1:], strict=True):
             if (left.slope > 0.0) == (right.slope > 0.0):
                 continue  # both tangents point along the branch: the measure rises, or falls, all the way
-            by_share = share_scales(left, right, self._workspace.balance.system.least_size)
+            by_share = self._by_share(left, right)
             g_left, g_right = left.slope * by_share[0], right.slope * by_share[1]
             if g_left > 0.0 >= g_right:
                 # The slope by the share of the chord is brought to 0: it jumps over it at a corner.
@@ -187,7 +187,7 @@ class _MaximaSearch:
         below = top - (1.0 - COMPETES) * self._size
         if max(left.value, right.value) < below:
             return None, True
-        by_share = share_scales(left, right, self._workspace.balance.system.least_size)
+        by_share = self._by_share(left, right)
         g_left, g_right = left.slope * by_share[0], right.slope * by_share[1]
         if g_left == 0.0 == g_right:
             return None, True  # a given load does not change with the frequency
@@ -236,12 +236,14 @@ class _MaximaSearch:
             for each in zip(solutions, tangents, values.tolist(), slopes.tolist(), strict=True)
         ]  # fmt: skip
 
+    def _by_share(self, left: _Node, right: _Node) -> tuple[float, float]:
+        """Return what turns both tangents into derivatives by the share of the chord between them."""
+        ends = left.solution, right.solution, left.tangent, right.tangent
+        return share_scales(*ends, self._workspace.balance.system.least_size)
+
     def _between(self, left: _Node, right: _Node, share: float) -> _Node | None:
         """Return the solution at a share of the chord, its slope by the share; None if there is none."""
-        workspace, by_share = (
-            self._workspace,
-            share_scales(left, right, self._workspace.balance.system.least_size),
-        )
+        workspace, by_share = self._workspace, self._by_share(left, right)
         found, tangent = np.zeros(left.solution.size), np.zeros(left.solution.size)
         observed, values = np.zeros(workspace.balance.n_coefficients), np.zeros(MEASURES)
         good, _ = between(

@@ -89,13 +89,9 @@ def reduce_for_contacts(scene: Scene, count: int | None = None) -> ContactReduct
         if count is not None or size >= min(MOST, len(M)) or (error is not None and error <= GOOD):
             highest = [np.sqrt(max(each.omega2[size // 2 - 1], 0.0)) / (2.0 * np.pi) for each in limits]
             return ContactReduction(
-                scene=small,
-                modes=modes,
-                motions=motions,
-                error=error,
-                free_hz=highest[0],
+                scene=small, modes=modes, motions=motions, error=error, free_hz=highest[0],
                 stuck_hz=highest[1],
-            )
+            )  # fmt: skip
         size = int(MORE * size)
 
 

@@ -25,7 +25,7 @@ from solver.balance.kernels.residual import evaluate
 from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
-from solver.jit.lapack import copy_to, largest_entry, set_to
+from solver.jit.lapack import are_finite, copy_to, largest_entry, set_to
 from solver.jit.separate import apart
 from solver.linear.kernels.receptance import receptance
 
@@ -43,21 +43,27 @@ _ROUNDED = 1e-14  # relative residual that no further step makes smaller
 
 
 @apart
+def tangent_at(system: System, linear: Receptance, point: Evaluation, tangent: Real) -> bool:
+    """Fill `tangent` (nt + 1,) with du/dλ = −(dr/du)⁻¹ dr/dλ where last evaluated and 1; False: singular."""
+    n = tangent.size - 1
+    if factorise(system, linear, point, tangent, 0.0, 0.0) == 0.0:
+        return False
+    for i in range(n):
+        tangent[i] = -point.dr_dp[i]
+    tangent[n] = 1.0
+    step_back(system, point, tangent[:n])
+    return are_finite(tangent)
+
+
+@apart
 def slope_by_parameter(
     system: System, linear: Receptance, u: Real, point: Evaluation, x: Real, out: Real
 ) -> bool:
-    """Measure a solution with its slopes by λ, du/dλ = −(dr/du)⁻¹ dr/dλ.
-
-    False where dr/du is singular, or mechanics is not obeyed.
-    """
-    n = u.size
-    slope = np.empty(n)
-    if factorise(system, linear, point, slope, 0.0, 0.0) == 0.0:
+    """Measure a solution with its slopes by λ; False where dr/du is singular, or mechanics is not obeyed."""
+    tangent = np.empty(u.size + 1)
+    if not tangent_at(system, linear, point, tangent):
         return False
-    for i in range(n):
-        slope[i] = -point.dr_dp[i]
-    step_back(system, point, slope)
-    measure(system, linear, u, point, slope, 1.0, x, out)
+    measure(system, linear, u, point, tangent[: u.size], 1.0, x, out)
     return bool(out[LOST] <= ALLOWED)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from solver.balance.balance import less_harmonics, linear_part, more_harmonics, pad
 from solver.balance.kernels.haigh import utilisation
+from solver.balance.kernels.locate import tangent_at
 from solver.balance.kernels.output import extremes
 from solver.balance.rounding import observed_rounding
 from solver.balance.workspace import Workspace
@@ -29,7 +30,6 @@ from solver.continuation.extrema.kernels.error_steps import (
     motion_at,
     step_by,
     steps_beyond,
-    tangent_at,
 )
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance

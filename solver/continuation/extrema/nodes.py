@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from solver.balance.kernels.linearised_contacts import linearise, springs_at
-from solver.continuation.bracketing import OnBranch
 from solver.continuation.branch import ROWS, Points
 from solver.continuation.extrema.kernels import node_table as table
 from solver.continuation.extrema.kernels.node_table import Look, PointRow
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
     from solver.balance.workspace import Workspace
     from solver.continuation.extrema.resonance_search import Resonance
 
-_COLUMNS = ("solutions", "tangents", "measures", "observed", "states")
 _UNKNOWN = -2  # row of a node whose stiffness was not asked for
 
 
@@ -178,10 +176,10 @@ class NodeSolver:
     def __init__(self, workspace: Workspace, points: Points) -> None:
         self.workspace, balance = workspace, workspace.balance
         self.least = balance.system.least_size
-        self._one_solution = all(contact.keeps_together for contact in balance.scene.contacts)
+        one_solution = all(contact.keeps_together for contact in balance.scene.contacts)
         self._nodes: table.Nodes = cast(Any, table.new_nodes)(
-            workspace.system, workspace.linear, workspace.point,
-            *(np.ascontiguousarray(getattr(points, name)) for name in _COLUMNS), int(self._one_solution),
+            workspace.system, workspace.linear, workspace.point, one_solution,
+            *(np.ascontiguousarray(getattr(points, name)) for name in ROWS),
         )  # fmt: skip
         self._counts = self.table.counts
         self._model: LocalModel | None = None
@@ -274,7 +272,7 @@ class NodeSolver:
 
     def added(self, points: Points) -> list[PointRow]:
         """Return the rows of a branch as nodes of this table."""
-        rows = zip(*(getattr(points, name) for name in _COLUMNS), strict=True)
+        rows = zip(*(getattr(points, name) for name in ROWS), strict=True)
         return self.nodes([table.add_row(self._nodes, *row) for row in rows])
 
     def look(self, top: float) -> Look:
@@ -293,14 +291,3 @@ class NodeSolver:
         starts = np.array(guesses).reshape(len(guesses), self.workspace.balance.n_unknowns)
         row = self.run(table.solved_at, p, starts, onward, from_nothing)
         return None if row == table.NOWHERE else self.nodes([row])[0]
-
-
-def share_scales(left: OnBranch, right: OnBranch, least: float) -> tuple[float, float]:
-    """Return the factors that turn both tangents into derivatives by the share of the chord between them.
-
-    `least` is the size of a motion below which it is rounding [m]; see `kernels.node_table`.
-    """
-    scales: tuple[float, float] = table.share_scales(
-        left.solution, right.solution, left.tangent, right.tangent, least
-    )
-    return scales

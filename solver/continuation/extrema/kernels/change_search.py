@@ -475,7 +475,7 @@ def _sides(nodes: Nodes, a: int, b: int, allowed: float) -> tuple[int, int]:
         _turn(ways[side], measures[side], onward)
         ends[side] = NOWHERE
         if sides[side] == 1:
-            ends[side] = add_row(nodes, found[side], ways[side], measures[side], x[side], states[side])
+            ends[side] = add_row(nodes, found[side], ways[side], states[side], x[side], measures[side])
     return ends[0], ends[1]
 
 

@@ -11,8 +11,9 @@ from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.output import extremes, observed_motion
 from solver.balance.kernels.residual import evaluate
 from solver.contacts.kernels.system import UTILISED, Evaluation, Receptance, System
+from solver.continuation.extrema.kernels.suspects import amplitude_in
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Flags, Real, coefficient_count, cosine_position
+from solver.jit.fourier import Flags, Real
 from solver.jit.lapack import are_finite
 from solver.jit.separate import apart
 from solver.linear.kernels.receptance import receptance
@@ -61,12 +62,10 @@ def change_of(system: System, before: Real, after: Real) -> tuple[float, float]:
 @compiled
 def _largest_motion(system: System, change: Real) -> float:
     """Return the largest amplitude of a harmonic of a change of motions [m], whenever the clock starts."""
-    n, largest = coefficient_count(system.ks), 0.0
+    largest = 0.0
     for c in range(system.owner.size):
         for i in range(system.ks.size):
-            here = c * n + cosine_position(system.ks, i)
-            sine = change[here + 1] if system.ks[i] > 0 else 0.0
-            largest = max(largest, math.hypot(change[here], sine))
+            largest = max(largest, amplitude_in(change, c, system.ks, i))
     return largest
 
 
@@ -131,16 +130,3 @@ def steps_beyond(
     u, p = place[:n].copy(), place[n]
     step_by(system, linear, point, u, p, point.residual.copy(), across, x, place, found[SECOND])
     return are_finite(found[NEARER]) and are_finite(found[FIRST]) and are_finite(found[SECOND])
-
-
-@apart
-def tangent_at(system: System, linear: Receptance, point: Evaluation, tangent: Real) -> bool:
-    """Fill `tangent` (nt + 1,) with that by λ where last evaluated, λ last; False if dr/du is singular."""
-    n = tangent.size - 1
-    if factorise(system, linear, point, tangent, 0.0, 0.0) == 0.0:
-        return False
-    for i in range(n):
-        tangent[i] = -point.dr_dp[i]
-    tangent[n] = 1.0
-    step_back(system, point, tangent[:n])
-    return are_finite(tangent)

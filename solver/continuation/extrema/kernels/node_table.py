@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver.balance.kernels.jacobian import factorise, step_back
-from solver.balance.kernels.locate import between
+from solver.balance.kernels.locate import between, tangent_at
 from solver.balance.kernels.mechanics import ALLOWED, unaccounted
 from solver.balance.kernels.newton import newton
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS, PIECE, RESIDUAL, measure
@@ -250,13 +249,13 @@ def longer(array: Any, rows: int) -> Any:
 
 @compiled
 def new_nodes(
-    system: System, linear: Receptance, point: Evaluation, solutions: Real, tangents: Real, measures: Real,
-    observed: Real, states: Integer, one_solution: int,
+    system: System, linear: Receptance, point: Evaluation, one_solution: bool, solutions: Real,
+    tangents: Real, states: Integer, observed: Real, measures: Real,
 ) -> Nodes:  # fmt: skip
     """Return the table of the points of a branch (P, …)."""
     count = solutions.shape[0]
     room, counts = count + count // 2 + 64, np.zeros(8, np.int64)
-    counts[ROWS], counts[ONE_SOLUTION] = count, one_solution
+    counts[ROWS], counts[ONE_SOLUTION] = count, 1 if one_solution else 0
     return _new(
         system, linear, point, longer(solutions, room), longer(tangents, room), longer(measures, room),
         longer(observed, room), longer(states, room), np.full(room, NOWHERE), np.empty((room, 2)),
@@ -342,7 +341,7 @@ def note(nodes: Nodes, which: int, one: float, two: float, three: float) -> None
 
 @apart
 def add_row(
-    nodes: Nodes, solution: Real, tangent: Real, measures: Real, observed: Real, states: Integer
+    nodes: Nodes, solution: Real, tangent: Real, states: Integer, observed: Real, measures: Real
 ) -> int:  # fmt: skip
     """Add a row; return its number."""
     row, room = nodes.counts[ROWS], nodes.partners.size
@@ -428,21 +427,15 @@ def measured_at(nodes: Nodes, u: Real, p: float, norm: float, onward: float) -> 
     """
     system, linear, point, n = nodes.system, nodes.linear, nodes.point, u.size
     solution, tangent = np.empty(n + 1), np.empty(n + 1)
-    slope = tangent[:n]
-    if factorise(system, linear, point, slope, 0.0, 0.0) == 0.0:
+    if not tangent_at(system, linear, point, tangent):
         return NOWHERE
-    for i in range(n):
-        slope[i] = -point.dr_dp[i]
-    step_back(system, point, slope)
-    if not are_finite(slope):
-        return NOWHERE
-    for i in range(n):
-        solution[i], slope[i] = u[i], slope[i] * onward
-    solution[n], tangent[n] = p, onward
+    solution[:n], solution[n] = u, p
+    for i in range(n + 1):
+        tangent[i] *= onward
     x, out = np.zeros(nodes.observed.shape[1]), np.zeros(nodes.measures.shape[1])
-    measure(system, linear, u, point, slope, onward, x, out)
+    measure(system, linear, u, point, tangent[:n], onward, x, out)
     out[RESIDUAL] = norm
-    return add_row(nodes, solution, tangent, out, x, point.states) if are_finite(out) else NOWHERE
+    return add_row(nodes, solution, tangent, point.states, x, out) if are_finite(out) else NOWHERE
 
 
 @apart
@@ -528,7 +521,7 @@ def between_rows(nodes: Nodes, a: int, b: int, share: float) -> tuple[int, float
             - t * t * r * by_right * nodes.measures[b, slope]
         )
         off = max(off, abs(cubic - out[value]))
-    return add_row(nodes, found, way, out, x, nodes.point.states), off
+    return add_row(nodes, found, way, nodes.point.states, x, out), off
 
 
 @apart

@@ -264,7 +264,7 @@ def _refined(
     nodes.counts[SPENT] += iterations
     if not good:
         return _bracketed(nodes, a, b, what, level, close)
-    return add_row(nodes, found, way, out, x, nodes.point.states) if are_finite(out) else NOWHERE
+    return add_row(nodes, found, way, nodes.point.states, x, out) if are_finite(out) else NOWHERE
 
 
 @compiled

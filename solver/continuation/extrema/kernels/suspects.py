@@ -13,7 +13,7 @@ from solver.jit.separate import apart
 
 
 @compiled
-def _size(row: Real, c: int, ks: Integer, i: int) -> float:
+def amplitude_in(row: Real, c: int, ks: Integer, i: int) -> float:
     """Return the amplitude of harmonic number i of motion number c in a row of coefficients."""
     here = c * coefficient_count(ks) + cosine_position(ks, i)
     return abs(row[here]) if ks[i] == 0 else math.hypot(row[here], row[here + 1])
@@ -30,12 +30,12 @@ def _fill_shares(
     for row in range(solutions.shape[0]):
         for c in range(nc):
             for i in range(nk):
-                moved[row, i, c] = _size(solutions[row], c, ks, i)
+                moved[row, i, c] = amplitude_in(solutions[row], c, ks, i)
                 largest[row, c] = max(largest[row, c], moved[row, i, c])
     for p in range(begin.size):
         a, b = begin[p], begin[p] + 1
         for i in range(nk):
-            size = max(_size(observed[a], 0, ks, i), _size(observed[b], 0, ks, i))
+            size = max(amplitude_in(observed[a], 0, ks, i), amplitude_in(observed[b], 0, ks, i))
             shares[p, i] = size / max(counts[p], 1e-300)
         for c in range(nc):
             whole = max(moves * max(least, largest[a, c], largest[b, c]), 1e-300)
