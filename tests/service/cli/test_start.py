@@ -14,7 +14,7 @@ from service.jobs.kinds import studies
 
 SERVICE = {"fastapi", "sqlalchemy", "alembic", "httpx", "uvicorn", "pydantic_settings", "prometheus_client"}
 PICTURES = {"matplotlib", "pandas", "xarray", "pyarrow"}
-DESIGN = {"cvxpy", "clarabel", "casadi"}
+DESIGN = {"clarabel", "casadi"}
 NUMBERS = {"numpy", "scipy", "numba", "llvmlite", "pydantic"}
 
 
