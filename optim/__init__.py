@@ -1,6 +1,6 @@
 """The design layer: criteria with gradients, and the search for the best damper.
 
-The names in the stub beside this file are public, loaded on first use with what they need.
+The names in the stub beside this file are public, loaded on first use: CVXPY takes a second to import.
 """
 
 from solver.first_use import names_of, on_first_use

@@ -352,7 +352,7 @@ def _improved(
     result: DesignResult, begin: DesignEvaluation, should_stop: ShouldStop, tick: Tick
 ) -> DesignResult:
     """Return a result after a local search from a better design that was met beside a plateau."""
-    from optim.methods.minimax import thorough_search  # loads Clarabel, which most designs need not
+    from optim.methods.minimax import thorough_search  # loads CVXPY, which most designs need not
 
     search = DesignSearch(result.problem, lambda _share, _count: tick(), should_stop)
     search.keep(begin)

@@ -156,7 +156,7 @@ def comparison_figure(scene: Scene, lines: Sequence[ReportLine]) -> Figure:
 
 
 Json = Mapping[str, Any]
-_PACKAGES = ("stickslip", "numpy", "scipy", "numba", "casadi", "clarabel")
+_PACKAGES = ("stickslip", "numpy", "scipy", "numba", "casadi", "cvxpy", "clarabel")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,7 +14,7 @@ from service.jobs.kinds import studies
 
 SERVICE = {"fastapi", "sqlalchemy", "alembic", "httpx", "uvicorn", "pydantic_settings", "prometheus_client"}
 PICTURES = {"matplotlib", "pandas", "xarray", "pyarrow"}
-DESIGN = {"clarabel", "casadi"}
+DESIGN = {"cvxpy", "clarabel", "casadi"}
 NUMBERS = {"numpy", "scipy", "numba", "llvmlite", "pydantic"}
 
 
