@@ -103,7 +103,7 @@ bench: dev
 	$(BIN)/python -m benchmarks $(BENCH)
 
 docs: dev
-	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
 # Of all files of a version, for any system and any Python: which one is installed is another machine's affair.
 pins: dev

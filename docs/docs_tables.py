@@ -168,11 +168,13 @@ def _option(option: Key | Option | None) -> str:
 def data_columns_table() -> str:
     """Every kind of measured data with its columns, their units and the words of its head."""
     rows: list[tuple[str, ...]] = []
+    first: dict[tuple[str, ...], str] = {}  # the column in whose row units are written out
     for kind in data_kinds():
-        rows += (
-            (f"`{kind.name}`", f"`{column.name}`", ", ".join(known_units(column.dimension)), column.help)
-            for column in kind.columns
-        )
+        for column in kind.columns:
+            units = tuple(known_units(column.dimension))
+            named = first.setdefault(units, column.name)
+            told = f"as `{named}`" if named != column.name and len(units) > 1 else ", ".join(units)
+            rows.append((f"`{kind.name}`", f"`{column.name}`", told, column.help))
         rows += ((f"`{kind.name}`", f"head: `{word}`", "", text) for word, text in kind.words.items())
     return _table("kind | column | units, the first if none is named | what it is", rows)
 
@@ -256,13 +258,13 @@ def _way(kind: JobKind) -> str:
 
 
 def tables_of_kinds(registry: Registry) -> Mapping[str, Callable[[], str]]:
-    """The tables of docs/jobs.md for some kinds, by their marks."""
+    """The tables of docs/service.md for some kinds, by their marks."""
     return {"kinds": partial(kinds_table, registry), "interrupted": partial(interrupted_table, registry)}
 
 
 TABLES: Mapping[str, Mapping[str, Callable[[], str]]] = {
     "design.md": {"keys": problem_table, "criteria": criteria_table},
-    "jobs.md": tables_of_kinds(SHIPPED),
+    "service.md": tables_of_kinds(SHIPPED),
     "identification.md": {"columns": data_columns_table, "formats": data_formats_table},
     "laws.md": {"laws": laws_table},
     "matrices.md": {"formats": formats_table},

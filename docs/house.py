@@ -126,6 +126,26 @@ class House:
         found = [*(self.root / "tests").rglob("*.py"), *(self.root / LAB).glob("*/tests/*.py")]
         return _lines_of(path for path in found if "data" not in path.parts)
 
+    def pages(self) -> dict[str, int]:
+        """What there is to read: pages of the documentation, their words, and those of the README."""
+        texts = {path.name: path.read_text("utf-8") for path in (self.root / "docs").glob("*.md")}
+        readme = (self.root / "README.md").read_text("utf-8")
+        return {
+            "pages": len(texts),
+            "words": sum(len(text.split()) for text in texts.values()),
+            "words of the README": len(readme.split()),
+        }
+
+    def commands(self) -> int:
+        """Commands that `stickslip --help` lists."""
+        (table,) = (
+            node.value
+            for node in self.trees["service.cli.table"].body
+            if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "COMMANDS"
+        )
+        calls = (node for node in ast.walk(table) if isinstance(node, ast.Call))
+        return sum(ast.unparse(call.func) in ("CommandEntry", "CommandGroup") for call in calls)
+
     def deepest(self) -> int:
         """Folders below the package that lies deepest."""
         return max(len(path.relative_to(self.root).parts) - 2 for path in self.files.values())
@@ -263,6 +283,8 @@ def report(house: House) -> list[tuple[str, str]]:
         ("lines of each folder of the lab", ", ".join(f"{name} {n}" for name, n in house.rooms().items())),
         ("lines of the page", str(house.page())),
         ("lines of the tests", str(house.tests())),
+        ("commands", str(house.commands())),
+        ("pages, words, words of the README", ", ".join(str(count) for count in house.pages().values())),
         ("names of classes twice", str(classes)),
         ("names of modules twice", str(modules)),
         (f"functions with {PARAMETERS} parameters", ", ".join(house.with_many_parameters()) or "none"),

@@ -7,6 +7,7 @@ reference is made from the docstrings of the public names, the gallery from the 
 from __future__ import annotations
 
 import inspect
+import posixpath
 import re
 import sys
 from collections.abc import Iterator
@@ -16,6 +17,7 @@ from typing import Any
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
 from pdoc.docstrings import convert
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -25,11 +27,13 @@ MODULES = ("stickslip", *SUBJECTS, "service.client", "service.schemas.answers")
 _SECTION = re.compile(r"^## (.+)$")
 _ENTRY = re.compile(r"^- \[(?P<title>[^]]+)\]\((?P<page>[\w-]+\.md)\)")
 OUTSIDE = (
-    "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE", "CITATION.cff", "tests/README.md",
-    "benchmarks/frictionbench/README.md",
-    "deploy/stickslip.service", "deploy/stickslip.env.example", "deploy/compose.yaml", "deploy/nginx.conf",
-    "deploy/Caddyfile", "deploy/alerts.yaml", "deploy/grafana.json",
+    "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", "LICENSE", "CITATION.cff",
+    "tests/README.md", "deploy/stickslip.service", "deploy/stickslip.env.example", "deploy/compose.yaml",
+    "deploy/nginx.conf", "deploy/Caddyfile", "deploy/alerts.yaml", "deploy/grafana.json",
+    *(str(path.relative_to(ROOT)) for path in sorted((ROOT / "benchmarks").rglob("*.md"))),
 )  # fmt: skip
+_LINK = re.compile(r"(?<=\]\()(?P<target>[^)#:]+)(?=[)#])")
+VIEWS = "img/page/views"
 _PICTURE = re.compile(r"!\[(?P<words>[^]]*)\]\((?P<path>img/[\w./-]+\.(?:png|svg))\)")
 # pdoc takes what stands behind a colon for a type. Here it is one where a sentence follows on the next line,
 # and the description itself otherwise.
@@ -47,9 +51,18 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         elif (entry := _ENTRY.match(line)) is not None:
             entries.append({entry["title"]: entry["page"]})
     entries += [{module: _page(module)} for module in MODULES]
-    entries += [{"Changes": "CHANGELOG.md"}, {"Contributing": "CONTRIBUTING.md"}]
+    entries += [{"Changes": "CHANGELOG.md"}, {"Contributing": "CONTRIBUTING.md"}, {"Security": "SECURITY.md"}]
+    entries.append({"Tests": "tests/README.md"})
+    sections.append({"Measured": [{title: page} for title, page in _measured()]})
     config.nav = sections
     return config
+
+
+def _measured() -> Iterator[tuple[str, str]]:
+    """Title and page of what was measured."""
+    for name in OUTSIDE:
+        if name.startswith("benchmarks/"):
+            yield (ROOT / name).read_text(encoding="utf-8").splitlines()[0].lstrip("# "), name
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -61,34 +74,39 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     return files
 
 
-def on_page_markdown(markdown: str, **_: object) -> str:
-    """Point links out of docs/ at what the site has of them."""
-    return markdown.replace("](../README.md", "](index.md").replace("](../", "](")
+def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
+    """Point links at what the site has of the files of the repository."""
+    here = page.file.src_uri
+    folder = posixpath.dirname(_in_repository(here))
+
+    def in_site(link: re.Match[str]) -> str:
+        target = posixpath.normpath(posixpath.join(folder, link["target"]))
+        return posixpath.relpath(_in_site(target), posixpath.dirname(here) or ".")
+
+    return _LINK.sub(in_site, markdown)
+
+
+def _in_repository(page: str) -> str:
+    """Where a page of the site stands in the repository."""
+    if page == "index.md":
+        return "README.md"
+    return page if page in OUTSIDE else f"docs/{page}"
+
+
+def _in_site(file: str) -> str:
+    """Where the site has a file of the repository; the list of pages is its navigation."""
+    return "index.md" if file in ("README.md", "docs/index.md") else file.removeprefix("docs/")
 
 
 def made() -> dict[str, str]:
     """Return what is made here or stands outside docs/, by name."""
-    found = {name: (ROOT / name).read_text(encoding="utf-8") for name in OUTSIDE}
-    found["index.md"] = found.pop("README.md")
-    for name in ("index.md", "CONTRIBUTING.md", "CHANGELOG.md"):
-        found[name] = _from_docs(found[name])
+    found = {_in_site(name): (ROOT / name).read_text(encoding="utf-8") for name in OUTSIDE}
     found["gallery.md"] = gallery()
     return found | {_page(module): reference(module) for module in MODULES}
 
 
-def _from_docs(text: str) -> str:
-    """Point links of a page beside docs/ at what the site has; those of HTML are not rewritten by MkDocs."""
-    text = re.sub(r'(src|href)="docs/([^"#]+?)(?:\.md)?(?=[#"])', _in_site, text)
-    return text.replace("](docs/index.md", "](index.md").replace("](docs/", "](")
-
-
-def _in_site(link: re.Match[str]) -> str:
-    name = link[2] if Path(link[2]).suffix else f"{link[2]}.html"
-    return f'{link[1]}="{name}'
-
-
 def gallery() -> str:
-    """Return every picture of the pages, under the title of its page."""
+    """Return every picture of the pages, under the title of its page, and every view of the web page."""
     parts = ["# Gallery\n", "Every picture of these pages; each is drawn by the command on its page.\n"]
     for path in sorted((ROOT / "docs").glob("*.md")):
         text = path.read_text(encoding="utf-8")
@@ -96,6 +114,9 @@ def gallery() -> str:
         if pictures:
             parts.append(f"## [{text.splitlines()[0].lstrip('# ')}]({path.name})\n")
             parts += [f"{one[0]}\n" for one in pictures]
+    parts.append("## Every view of the page, light and dark, and in three smaller windows\n")
+    views = sorted((ROOT / "docs" / VIEWS).glob("*.png"))
+    parts += [f"![{view.stem.replace('-', ' ')}]({VIEWS}/{view.name})\n" for view in views]
     return "\n".join(parts)
 
 

@@ -1,4 +1,4 @@
-"""The page of FrictionBench in the documentation: one table, one picture."""
+"""The page of FrictionBench: one table, one picture."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ COLOURS = {"stickslip": "#0b6e99", "tmdsimpy": "#c2571a", "pyharm": "#7a8f2a", "
 HEAD = """# FrictionBench
 
 {cases} answered cases of friction damping in one neutral schema, and what codes make
-of them. Cases, answers, schema and [how to add a code](../benchmarks/frictionbench/README.md#add-a-code)
+of them. Cases, answers, schema and [how to add a code](README.md#add-a-code)
 are in `benchmarks/frictionbench`; `python -m benchmarks.frictionbench archive` packs them.
 
 Answers come by two ways: a closed form, or exact events in balls of 128 and more bits
@@ -57,13 +57,13 @@ of NLvib under Octave the dear rungs, of pyHarm, which compiles for long, all.
 
 {without}
 
-![Right digits over processor time of every rung of every case.](img/frictionbench.png)
+![Right digits over processor time of every rung of every case.](../../docs/img/frictionbench.png)
 
 """
 
 
 def write() -> str:
-    """Write docs/frictionbench.md and its picture; return the page's name."""
+    """Write table.md and its picture; return the page's name."""
     codes = [code for code in COLOURS if scorer.kept(code)]
     scores = {code: scorer.kept(code) for code in codes}
     answers = {
@@ -97,9 +97,9 @@ def write() -> str:
             f"| `{name}` | {case['words']} | {float(answer['value']):.10g} | {known} | {_multiplier(answer)} "
             f"| {' | '.join(cells)} |\n"
         )
-    (DOCS / "frictionbench.md").write_text("".join(lines))
+    (HERE / "table.md").write_text("".join(lines))
     _picture(scores)
-    return str(DOCS / "frictionbench.md")
+    return str(HERE / "table.md")
 
 
 def _multiplier(answer: dict[str, Any]) -> str:

@@ -281,7 +281,7 @@ def test_the_check_of_the_documentation_sees_it() -> None:
     from docs_tables import tables_of_kinds, with_tables  # a service that takes this kind has no docs
 
     registry = registry_of([ENTRY])
-    page = (ROOT / "docs" / "jobs.md").read_text("utf-8")
+    page = (ROOT / "docs" / "service.md").read_text("utf-8")
     assert with_tables(page, tables_of_kinds(SHIPPED)) == page
     longer = with_tables(page, tables_of_kinds(registry))
     row = (

@@ -19,7 +19,10 @@ import solver
 from service.cli import main
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-PAGE, OF_A_FACE = (ROOT / "docs" / "fe-example.md").read_text(encoding="utf-8").split("\n## A whole face\n")
+PAGE, OF_A_FACE, OF_A_LIFE = re.split(
+    r"\n## (?:A whole face|From the amplitude to a life)\n",
+    (ROOT / "docs" / "fe-example.md").read_text(encoding="utf-8"),
+)
 
 
 def commands(page: str) -> list[str]:

@@ -1,12 +1,12 @@
-"""The page on a blade from a mesh to its life: every line of it, in order, and the numbers it quotes."""
+"""The life of the blade of the page: every line of that part, in order, and the numbers it quotes."""
 
 import re
 from pathlib import Path
 
 import pytest
-from test_fe_example import ROOT, beside_docs, run, with_the_contact
+from test_fe_example import OF_A_LIFE, beside_docs, run, with_the_contact
 
-PAGE = (ROOT / "docs" / "life.md").read_text(encoding="utf-8")
+PAGE = OF_A_LIFE
 BLOCKS = re.findall(r"^```(sh|python)\n(.*?)^```$", PAGE, flags=re.MULTILINE | re.DOTALL)
 
 __all__ = ["beside_docs"]
@@ -18,7 +18,7 @@ def test_the_page_runs_line_by_line(capsys: pytest.CaptureFixture[str]) -> None:
     said = {}
     for kind, block in BLOCKS:
         if kind == "python":
-            exec(compile(block, "life.md", "exec"), {"__name__": "page"})
+            exec(compile(block, "fe-example.md", "exec"), {"__name__": "page"})
             said["best"] = " ".join(capsys.readouterr().out.split())
             continue
         for line in block.splitlines():

@@ -38,13 +38,12 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 ADDRESS = "http://127.0.0.1:8000"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+MEASURED = [*sorted((ROOT / "benchmarks").rglob("*.md")), ROOT / "CONTRIBUTING.md", ROOT / "SECURITY.md"]
 # Pages whose lines need each other, or draw pictures: tests that run them.
 ELSEWHERE = {
     "identification.md": "project/test_identification.py",
     "fe-disk.md": "project/test_fe_disk.py",
     "fe-example.md": "project/test_fe_example.py",
-    "life.md": "project/test_life_example.py",
-    "paper.md": "solver/published/test_paper_figures.py",
 }
 BLOCKS = [
     block
@@ -317,7 +316,7 @@ def names_of_tests() -> set[str]:
     return {name for file in files for name in re.findall(r"def (test_\w+)\(", file.read_text("utf-8"))}
 
 
-@each("page", PAGES)
+@each("page", [*PAGES, *MEASURED])
 def test_modules_and_tests_that_a_page_names_exist(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     paths = re.findall(r"`((?:stickslip|solver|optim|service)(?:\.[a-zA-Z_]\w*)+)(?=[(`\[])", text)
@@ -333,7 +332,7 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@each("page", PAGES)
+@each("page", [*PAGES, *MEASURED])
 def test_links_and_pictures_exist(page: Path) -> None:
     targets = re.findall(r"\]\(([^)]+)\)", page.read_text(encoding="utf-8"))
     missing = []

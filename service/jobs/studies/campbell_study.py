@@ -38,7 +38,7 @@ class Campbell(Study, HarmonicRequest):
     NAME, FUNCTION = "campbell", "optim:campbell_diagram"
     RESULT = answered("optim.results.studies_result:CampbellDiagram", "CampbellResult")
     TOLD = "optim.views.tables.studies:campbell"
-    SHOWS = "crossings and speeds above the limit ([Campbell diagrams](campbell.md))"
+    SHOWS = "crossings and speeds above the limit ([Campbell diagrams](disks.md#campbell-diagrams))"
     EMPTY = ("orders", "it stored no sweep to draw")
     SWEEPS = "one an order; one for all without sectors"
 

@@ -49,7 +49,7 @@ class QuasiPeriodicStudy(Study, HarmonicRequest):
     EXAMPLES = ({"scene": "two-dof", "frequency_hz": 1.05, "second_hz": 1.3821, "amplitude": 60},)
     NAME, FUNCTION, RESULT = "quasi-periodic", "solver:quasi_periodic", quasi_periodic_result
     TOLD = "stickslip.lab.quasi_periodic.tables:quasi_periodic"
-    SHOWS = "the response to two frequencies ([two base frequencies](quasi-periodic.md))"
+    SHOWS = "the response to two frequencies ([two base frequencies](transients.md#two-base-frequencies))"
     FIGURE = "stickslip.lab.quasi_periodic.pictures:torus_drawn"
     COUNTED = "looks"
 

@@ -42,7 +42,7 @@ class WorstMistuningStudy(Study, HarmonicRequest):
         worst=Table | None, residual=Table | None, patterns=list[Table],
     )  # fmt: skip
     TOLD = "stickslip.lab.worst_mistuning.tables:worst_mistuning"
-    SHOWS = "the worst pattern with its bounds, and intentional ones ([patterns](patterns.md))"
+    SHOWS = "the worst pattern with its bounds, and intentional ones ([patterns](disks.md#the-worst-pattern))"
     COUNTED = "climbs and responses"
     GROUPED: ClassVar = {"intentional": "solver:IntentionalMistuning", "search": "solver:WorstSearch"}
     EMPTY = ("worst", "the peak of no pattern is known")

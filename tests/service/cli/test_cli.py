@@ -6,6 +6,7 @@ import pty
 import re
 import subprocess
 from collections.abc import Callable
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -84,7 +85,7 @@ def test_design_takes_several_variables(run: Run) -> None:
             ["damper.N0", " N", "2.346 m at 1.04", "responses in"],
         ),
         ("march two-dof --frequency 1.2", ["1.85 m", "periods"]),
-        ("--version", ["0.1.0"]),
+        ("--version", [version("stickslip")]),
         ("--help", ["design", "sweep", "submit", "db"]),
         ("design --help", ["PATH LO HI", "--max-band", "--problem", "--never-separates"]),
     ],

@@ -10,14 +10,14 @@ import pytest
 
 DOCS = Path(__file__).resolve().parent.parent.parent.parent / "docs"
 SCRIPTS = sorted(script for script in (DOCS / "paper").glob("*.py") if script.stem != "look")
-PAGE = (DOCS / "paper.md").read_text(encoding="utf-8")
+PAGE = (DOCS.parent / "benchmarks" / "paper.md").read_text(encoding="utf-8")
 SLOW = ("figure13",)
 LONGEST_SCRIPT = 40
 
 
 def quoted(script: Path) -> dict[str, str]:
     """What the page says beside a figure: the first and the last column of its table."""
-    _, _, after = PAGE.partition(f"| [{script.name}](paper/{script.name}) |")
+    _, _, after = PAGE.partition(f"| [{script.name}](../docs/paper/{script.name}) |")
     rows = re.match(r".*\n\|---.*\n((?:\|.*\n)+)", after)
     assert rows is not None, f"{script.name} has no table"
     cells = [re.split(r"(?<!\\)\|", row.replace("\n", ""))[1:-1] for row in rows[1].splitlines()]
