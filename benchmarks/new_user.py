@@ -48,6 +48,11 @@ class Tutorial:
     program: str | None
     what: str
 
+    def text(self) -> str:
+        """What is followed of the page: a second scene, of a life, is another day's work."""
+        whole = (ROOT / "docs" / self.page).read_text("utf-8")
+        return whole.partition("\n## From the amplitude to a life\n")[0]
+
 
 TUTORIALS = (
     Tutorial(page="fe-example.md", program=None, what="own FE blade (scikit-fem, 1830 rows) to its report"),
@@ -184,7 +189,7 @@ def mesh_to_report(tutorial: Tutorial) -> list[tuple[str, ...]]:
     """Follow a page line by line, as processes, until its report is written."""
     if tutorial.program is not None and shutil.which(tutorial.program) is None:
         return [(tutorial.what, "300", "skipped", f"{tutorial.program} is not installed")]
-    text = (ROOT / "docs" / tutorial.page).read_text("utf-8")
+    text = tutorial.text()
     commands = keys = actions = 0
     ran = 0.0
     with tempfile.TemporaryDirectory() as name:

@@ -1,14 +1,12 @@
 """The benchmark of a new user: what it reads off the pages is what the pages say."""
 
 import shlex
-from pathlib import Path
 
 import pytest
 
 from benchmarks.harness import WrongResultError
 from benchmarks.new_user import TUTORIALS, Tutorial, edited, stages, steps
 
-DOCS = Path(__file__).resolve().parent.parent.parent / "docs"
 SCENE = """name = "blade"
 
 [structure]
@@ -31,7 +29,7 @@ band = [129.0, 517.0]
 @pytest.mark.parametrize("tutorial", TUTORIALS, ids=lambda tutorial: tutorial.page)
 def test_every_page_is_followed_from_the_mesh_to_a_report(tutorial: Tutorial) -> None:
     """Each command once, in order, with the edit between the import and the first use of the scene."""
-    text = (DOCS / tutorial.page).read_text("utf-8")
+    text = tutorial.text()
     done = list(steps(text))
     commands = [line for kind, line in done if kind == "sh"]
     outside = text.split("```sh\n")[1:]
@@ -43,7 +41,7 @@ def test_every_page_is_followed_from_the_mesh_to_a_report(tutorial: Tutorial) ->
 
 
 def test_the_edit_of_the_blade_is_the_one_its_page_asks_for() -> None:
-    (section,) = [text for kind, text in steps((DOCS / "fe-example.md").read_text("utf-8")) if kind == "edit"]
+    (section,) = [text for kind, text in steps(TUTORIALS[0].text()) if kind == "edit"]
     scene, keys = edited(SCENE, section)
     assert "\ndamping_ratio = 0.001\n" in scene
     assert 'between = ["platform", "ground"]' in scene
@@ -53,7 +51,7 @@ def test_the_edit_of_the_blade_is_the_one_its_page_asks_for() -> None:
 
 
 def test_the_edit_of_the_disk_changes_force_and_band_too() -> None:
-    (section,) = [text for kind, text in steps((DOCS / "fe-disk.md").read_text("utf-8")) if kind == "edit"]
+    (section,) = [text for kind, text in steps(TUTORIALS[1].text()) if kind == "edit"]
     scene, _ = edited(SCENE, section)
     for line in ("damping_ratio = 0.0005", "amplitude = 20.0", "engine_order = 4", "band = [150.0, 450.0]"):
         assert f"\n{line}\n" in scene
@@ -61,7 +59,7 @@ def test_the_edit_of_the_disk_changes_force_and_band_too() -> None:
 
 
 def test_an_edit_that_the_scene_does_not_allow_is_told() -> None:
-    (section,) = [text for kind, text in steps((DOCS / "fe-disk.md").read_text("utf-8")) if kind == "edit"]
+    (section,) = [text for kind, text in steps(TUTORIALS[1].text()) if kind == "edit"]
     with pytest.raises(WrongResultError, match="engine_order"):
         edited(SCENE.replace("engine_order = 1\n", ""), section)
 
