@@ -31,7 +31,7 @@ class _Pareto(PointsOfFront, ProblemRequest):
     NAME, FUNCTION, RESULT = "pareto", "optim:pareto_front", pareto_result
     KEYS = "those of a design problem, `points`"
     TOLD = "optim.views.tables.design:front"
-    SHOWS, SWEEPS = "the front of peak against band ([peak against band](design.md#peak-against-band))", "those of its points"
+    SHOWS, SWEEPS = "the front of [peak against band](design.md#peak-against-band)", "those of its points"
     EMPTY, FIGURE = ("points", "its front has no point"), "optim.views.plots.figures:pareto_figure"
 
     def sizes(self, scene: Scene) -> list[Issue]:

@@ -32,7 +32,7 @@ class Sensitivities(Study, HarmonicRequest):
         "optim.results.studies_result:SensitivityResult", "SensitivitiesResult", peaks=list[PeakAt]
     )
     TOLD = "optim.views.tables.studies:shares"
-    SHOWS = "the change of peaks and band by one per cent of each parameter ([sensitivities](design.md#sensitivities))"
+    SHOWS = "what one per cent of a parameter does to peaks and band ([its page](design.md#sensitivities))"
     SWEEPS, FIGURE = "the response", "optim.views.plots.figures:sensitivities_figure"
 
     limit: Annotated[PositiveNumber | None, Flag(metavar="A")] = Field(
