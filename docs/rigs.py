@@ -1,4 +1,4 @@
-"""The picture of synthetic rigs of docs/identification.md: `python docs/rigs.py docs/img`; some minutes."""
+"""The picture of synthetic rigs of benchmarks/accuracy.md: `python docs/rigs.py docs/img`; some minutes."""
 
 from __future__ import annotations
 

@@ -73,7 +73,8 @@ def test_the_page_runs_line_by_line(capsys: pytest.CaptureFixture[str]) -> None:
             scene.write_text(with_the_contact(scene.read_text()))
     made, imported, _, free, loaded, best, _, response = (said[line] for line in COMMANDS)
     assert "1830 rows" in made
-    assert "node 638 platform node 373" in made
+    assert "tip node 638" in made
+    assert "platform node 373" in made
     assert "258.43 Hz, 1137 Hz" in imported
     assert "0.1517 kg" in imported
     assert "31 modes" in imported
