@@ -129,55 +129,29 @@ def friction_work(cycle: ContactCycle, e: int, changes: Sequence[Change]) -> tup
     """Return the work that friction takes out at contact `e` in one period [J], and its slopes.
 
     Of a rubbing contact it is that of the tangential force: the normal one moves nothing across the surface.
+    A stuck contact does none: what is left of terms that cancel is not work, nor a slope of it.
     """
-    work, slopes = 0.0, np.zeros(len(changes))
-    system, ports = cycle.balance.system, cycle.ports(e)
+    work, slopes, ports = 0.0, np.zeros(len(changes)), cycle.ports(e)
+    pairing = work_pairing(cycle.balance.system.ks, cycle.U.shape[1])
     for a in cycle.balance.scene.contacts[e].RUBBING:
-        U, F = cycle.U[ports[a]], cycle.F[ports[a]]
-        dU = np.array([change.dU[ports[a]] for change in changes]).reshape(-1, U.size)
-        dF = np.array([
-            change.dF[ports[a]] + force_change(system, e, a, cycle.dF_dU, change.dU) for change in changes
-        ]).reshape(-1, U.size)  # fmt: skip
-        done, rises = work_of(U, F, dU, dF, system.ks)
-        work += float(done)
-        slopes += rises
+        F, speed = cycle.F[ports[a]], pairing @ cycle.U[ports[a]]
+        if abs(F @ speed) <= _ROUNDING * np.sum(np.abs(F * speed)):
+            continue
+        work += float(F @ speed)
+        first = int(cycle.balance.system.first_block[e]) + a * len(ports)
+        for i, change in enumerate(changes):
+            dU = change.dU[ports.start : ports.stop]
+            dF = change.dF[ports[a]] + np.einsum("bij,bj->i", cycle.dF_dU[first : first + len(ports)], dU)
+            slopes[i] += dF @ speed + F @ (pairing @ dU[a])
     return work, slopes
 
 
-def force_change(system: System, e: int, a: int, dF_dU: Real, dU: Real) -> Real:
-    """Return the change of the force (n,) at port `a` of contact `e` for motions that change by `dU`."""
-    first, ports = system.first_block[e], range(int(system.first_port[e]), int(system.first_port[e + 1]))
-    changes = [dF_dU[first + a * len(ports) + b] @ dU[port] for b, port in enumerate(ports)]
-    total: Real = np.sum(changes, axis=0) if len(ports) > 1 else changes[0]
-    return total
-
-
-def work_of(U: Real, F: Real, dU: Real, dF: Real, ks: Integer) -> tuple[Real, Real]:
-    """Return the work of forces F on motions U in a period [J], (...,), and its changes by dU and dF.
-
-    All are coefficients (..., n). A stuck contact does none: what is left of terms that cancel is not work,
-    and 0 is the least, so that the change is 0 too.
-    """
-    speed = _speed(U, ks)
-    done = np.sum(F * speed, axis=-1)
-    real = np.abs(done) > _ROUNDING * np.sum(np.abs(F * speed), axis=-1)
-    rises = np.sum(dF * speed + F * _speed(dU, ks), axis=-1)
-    return math.pi * np.where(real, done, 0.0), math.pi * np.where(real, rises, 0.0)
-
-
 def work_pairing(ks: Integer, n: int) -> Real:
-    """Return the matrix P (n, n) of the work F·(P U) in a period."""
-    return math.pi * _speed(np.eye(n), ks).T
-
-
-def _speed(coefficients: Real, ks: Integer) -> Real:
-    """Return the coefficients (..., n) of dq/dτ for those of the ascending harmonics `ks` alone."""
-    first = int(ks[0] == 0)
-    orders = ks[first:]
-    result = np.zeros_like(coefficients)
-    result[..., first::2] = orders * coefficients[..., first + 1 :: 2]
-    result[..., first + 1 :: 2] = -orders * coefficients[..., first::2]
-    return result
+    """Return the matrix P (n, n) of the work F·(P U) in a period, of the ascending harmonics `ks`."""
+    pairing, orders = np.zeros((n, n)), math.pi * ks[ks > 0]
+    cosines = np.arange(n - 2 * orders.size, n, 2)
+    pairing[cosines, cosines + 1], pairing[cosines + 1, cosines] = orders, -orders
+    return pairing
 
 
 def least_load(cycle: ContactCycle, e: int, changes: Sequence[Change]) -> tuple[float, Real] | None:

@@ -6,60 +6,49 @@ theorem). A maximum may also be a corner of the response, closed in by bracketin
 and m⁺ meet at ω_k(p); as for peaks of the amplitude (`solver.sensitivity.nonsmooth`) the derivative is
 m⁻_p + m⁻_ω dω_k/dp with dω_k/dp = −(m⁺_p − m⁻_p)/(m⁺_ω − m⁻_ω), from solutions beside the corner at two
 distances, extrapolated to it.
-
-Two maxima may hide between two points of a branch: near the top it is made dense until cubics through its
-points predict the measure between them, as for the peaks of the amplitude
-(`solver.continuation.extrema.extrema`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
-from operator import attrgetter
-from typing import Annotated, TypeVar
+from typing import Annotated
 
 import numpy as np
 
 from solver.balance.balance import Kind, contact_index
-from solver.balance.kernels.locate import between
-from solver.balance.kernels.output import MEASURES
-from solver.balance.kernels.residual import contact_values, evaluate
+from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, PIECE
+from solver.balance.kernels.residual import contact_values, evaluate_contacts, friction_works
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import evaluation_by_value
-from solver.continuation.bracketing import closing_in, dense_between
-from solver.continuation.branch import Branch
-from solver.continuation.extrema.kernels.node_table import share_scales
-from solver.continuation.extrema.kernels.peak_search import MOST_HALVINGS, NEAR_THE_TOP, PREDICTED
+from solver.continuation.bracketing import closing_in
+from solver.continuation.branch import Branch, Points
+from solver.continuation.extrema.kernels.node_table import NOWHERE, ROWS, Look, halve, look_between
+from solver.continuation.extrema.kernels.peak_search import MOST_HALVINGS, NEAR_THE_TOP, PREDICTED, SURE
+from solver.continuation.extrema.nodes import NodeSolver
 from solver.errors import SettingError
 from solver.jit.fourier import Real
-from solver.linear.kernels.receptance import receptance
 from solver.response.wear import (
     Change,
     ContactCycle,
     Measured,
     WearSensitivity,
-    force_change,
-    friction_work,
     least_load,
     slip_travel,
-    work_of,
     work_pairing,
 )
 from solver.results.told import Piece
-from solver.sensitivity.gradient import Sensitivities
+from solver.sensitivity.gradient import TWO_PI, Sensitivities
 from solver.sensitivity.nonsmooth import SMOOTH, corner_slopes
 
-Number = TypeVar("Number", float, Real)
 # Maxima below this share of the highest cannot lead within one step of an optimiser.
 COMPETES = 0.6
 _HALVINGS_BELOW = 2  # of an interval whose maximum could compete, but not lead
 _FLAT = 1e-11  # slope over the whole interval, relative to the value, at which a maximum is found
 _NARROW = 1e-12  # share of the interval at which a corner is found
-_MOST_ITERATIONS = 12
+_ROUNDED = 1e-13  # share of the size below which the nearer of two points to the root is the higher
 
 
 class Measure(Enum):
@@ -71,12 +60,7 @@ class Measure(Enum):
     SLIP_TRAVEL = "slip travel"
 
 
-_MEASURES: dict[Measure, Callable[[ContactCycle, int, Sequence[Change]], tuple[float, Real] | None]] = {
-    Measure.FRICTION_WORK: friction_work,
-    Measure.FRICTION_POWER: friction_work,
-    Measure.LEAST_LOAD: least_load,
-    Measure.SLIP_TRAVEL: slip_travel,
-}
+_BY_CYCLE = {Measure.LEAST_LOAD: least_load, Measure.SLIP_TRAVEL: slip_travel}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -122,167 +106,146 @@ def worst_wear(
     return tuple(one for one in found if one.value >= COMPETES * found[0].value)
 
 
-@dataclass(frozen=True, slots=True)
-class _Node:
-    """A point of the branch with the number to be made largest and its slope along the tangent."""
-
-    solution: Real
-    tangent: Real
-    value: float
-    slope: float
-
-
 class _MaximaSearch:
-    """Looks for the maxima of one measure of one contact along a branch."""
+    """Looks for the maxima of one measure of one contact along a branch, on a table of its points."""
 
     def __init__(self, branch: Branch, e: int, measure: Measure) -> None:
-        self._workspace = Workspace.of(branch.balance)
-        self._point = evaluation_by_value(self._workspace.point)  # views: they follow the workspace
-        frequency = branch.balance.parameter.kind is Kind.FREQUENCY
-        fixed = frequency and not np.any(branch.balance.system.load_rise)
-        # The frequency does not change the contacts but for loads that follow it.
-        self._fixed = contact_values(branch.balance.system, 0.0, 0.0) if fixed else None
-        self._e = e
-        self._measure = measure
+        unseen = np.zeros((len(branch.solutions), branch.balance.n_coefficients))
+        self._solver = NodeSolver(Workspace.of(branch.balance), Points.of(branch, observed=unseen))
+        self._solver.begin()
+        self._e, self._measure = e, measure
+        self._works = measure in (Measure.FRICTION_WORK, Measure.FRICTION_POWER)
         self._sign = -1.0 if measure is Measure.LEAST_LOAD else 1.0
-        nodes = self._on_branch(branch.solutions, branch.tangents)
-        top = max(node.value for node in nodes)
-        self._size = max(abs(node.value) for node in nodes)
-        self._nodes = [nodes[0]]
-        for right in nodes[1:]:
-            inside = dense_between(self._nodes[-1], right, MOST_HALVINGS, partial(self._halved, top))
-            self._nodes += [*inside, right]
+        self._numbers = np.zeros((0, 2))  # of each row of the table what is made largest, and its slope
+        values = self._known()[self._solver.order, 0]
+        self._top, self._size = float(values.max()), float(np.abs(values).max())
+        # Below nothing competes: of the least load every minimum does.
+        self._least = -math.inf if self._sign < 0.0 else COMPETES * self._top
+        self._densify()
+
+    def _known(self) -> Real:
+        """Return the numbers of all rows, those that are new among them."""
+        rows, known = self._solver.table, len(self._numbers)
+        count = int(rows.counts[ROWS])
+        if count > known:
+            fresh = self._measured(rows.solutions[known:count], rows.tangents[known:count])
+            self._numbers = np.concatenate([self._numbers, fresh])
+        return self._numbers
+
+    def _look(self) -> tuple[Look, Real]:
+        """Return what may stand between neighbouring points, and how high by the slopes."""
+        rows, known = self._solver.table, self._known()
+        seen = np.zeros((len(known), rows.measures.shape[1]))
+        seen[:, HIGH] = seen[:, LOW] = known[:, 0]
+        seen[:, HIGH_SLOPE] = seen[:, LOW_SLOPE] = known[:, 1]
+        seen[:, PIECE] = rows.measures[: len(known), PIECE]
+        partners, scales = np.full(len(known), NOWHERE), np.empty((len(known), 2))
+        look = look_between(
+            rows.solutions, rows.tangents, seen, partners, scales, self._solver.order, self._solver.least,
+            -math.inf,
+        )  # fmt: skip
+        ends = np.maximum(look.measures[:-1, HIGH], look.measures[1:, HIGH])
+        rise, fall = look.slopes[:, 0, 0], look.slopes[:, 1, 0]
+        return look, ends + 0.25 * (np.maximum(rise, 0.0) + np.maximum(-fall, 0.0))
+
+    def _densify(self) -> None:
+        """Halve intervals until cubics predict the measure: finely near the top, coarsely elsewhere."""
+        if self._solver.order.size < 2:
+            return
+        look, reach = self._look()
+        same = look.measures[:-1, PIECE] == look.measures[1:, PIECE]
+        off = np.where(same & (look.error <= SURE * PREDICTED * self._size), 0.0, math.inf)
+        off[np.all(look.slopes[:, :, 0] == 0.0, axis=1)] = 0.0  # a given load does not change
+        for depth in range(MOST_HALVINGS):
+            near = reach >= self._top - (1.0 - NEAR_THE_TOP) * self._size
+            competes = (reach >= self._top - (1.0 - COMPETES) * self._size) & (depth < _HALVINGS_BELOW)
+            wanted = (off > PREDICTED * self._size) & (near | competes)
+            if not wanted.any():
+                break
+            before = len(self._numbers)
+            self._solver.run(halve, wanted, False)
+            values, fresh = self._known()[self._solver.order, 0], self._solver.order >= before
+            cubic = look.measures[:-1, HIGH] + look.measures[1:, HIGH]
+            cubic = 0.5 * cubic + (look.slopes[:, 0, 0] - look.slopes[:, 1, 0]) / 8.0
+            places = np.flatnonzero(fresh)
+            missed = np.abs(cubic[np.cumsum(~fresh)[places] - 1] - values[places])
+            off = np.zeros(fresh.size - 1)
+            off[places - 1] = off[places] = missed
+            look, reach = self._look()
 
     def maxima(self) -> list[WorstWear]:
-        """Return all local maxima, highest first."""
-        found = []
-        for left, right in zip(self._nodes[:-1], self._nodes[1:], strict=True):
-            if (left.slope > 0.0) == (right.slope > 0.0):
-                continue  # both tangents point along the branch: the measure rises, or falls, all the way
-            by_share = self._by_share(left, right)
-            g_left, g_right = left.slope * by_share[0], right.slope * by_share[1]
-            if g_left > 0.0 >= g_right:
-                # The slope by the share of the chord is brought to 0: it jumps over it at a corner.
-                best = left if left.value >= right.value else right
-                at = partial(self._between, left, right)
-                for node, slope, width in closing_in(at, attrgetter("slope"), g_left, g_right):
-                    best = node if node.value >= best.value else best
-                    if abs(slope) <= _FLAT * self._size or width <= _NARROW:
-                        break
-                found.append(self._worst(best, interior=True))
-        first, last = self._nodes[0], self._nodes[-1]
-        if len(self._nodes) == 1 or first.slope <= 0.0:
-            found.append(self._worst(first, interior=False))
-        if len(self._nodes) > 1 and last.slope >= 0.0:
-            found.append(self._worst(last, interior=False))
+        """Return all local maxima that may compete, highest first."""
+        found, order, values = [], self._solver.order, self._known()
+        if order.size == 1 or values[order[0], 1] <= 0.0:
+            found.append(self._worst(order[0], interior=False))
+        if order.size > 1:
+            if values[order[-1], 1] >= 0.0:
+                found.append(self._worst(order[-1], interior=False))
+            look, reach = self._look()
+            rises, falls = look.slopes[:, 0, 0] > 0.0, look.slopes[:, 1, 0] <= 0.0
+            for j in np.flatnonzero(rises & falls & (reach >= self._least)).tolist():
+                top = self._top_between(*order[j : j + 2].tolist(), *look.slopes[j, :, 0].tolist())
+                found.append(self._worst(top, interior=True))
         return sorted(found, key=lambda one: -self._sign * one.value)
 
-    def _worst(self, node: _Node, *, interior: bool) -> WorstWear:
-        at = float(self._workspace.balance.parameter.outside(float(node.solution[-1])))
-        solution = node.solution[:-1].copy()
-        return WorstWear(value=self._sign * node.value, at=at, solution=solution, interior=interior)
+    def _top_between(self, left: int, right: int, rise: float, fall: float) -> int:
+        """Return the row of the maximum between two, with the slopes by the share of the way there.
 
-    def _halved(self, top: float, left: _Node, right: _Node, depth: int) -> tuple[_Node | None, bool]:
-        """Return the node between two, and whether a cubic predicts it; None where nothing can compete."""
-        below = top - (1.0 - COMPETES) * self._size
-        if max(left.value, right.value) < below:
-            return None, True
-        by_share = self._by_share(left, right)
-        g_left, g_right = left.slope * by_share[0], right.slope * by_share[1]
-        if g_left == 0.0 == g_right:
-            return None, True  # a given load does not change with the frequency
-        reach = max(left.value, right.value) + 0.25 * (max(g_left, 0.0) + max(-g_right, 0.0))
-        if reach < top - (1.0 - NEAR_THE_TOP) * self._size and depth <= MOST_HALVINGS - _HALVINGS_BELOW:
-            return None, True
-        middle = self._between(left, right, 0.5)
-        cubic = 0.5 * (left.value + right.value) + (g_left - g_right) / 8.0
-        return middle, middle is None or abs(cubic - middle.value) <= PREDICTED * self._size
+        The slope is brought to 0: it jumps over it at a corner.
+        """
+        best = left if self._known()[left, 0] >= self._known()[right, 0] else right
+        ends = self._solver.nodes([left, right])
+        at = partial(self._solver.between, ends[0], ends[1])
+        for node, slope, width in closing_in(at, lambda node: self._known()[node.number, 1], rise, fall):
+            lost = self._known()[best, 0] - self._known()[node.number, 0]
+            best = node.number if lost <= _ROUNDED * self._size else best
+            if abs(slope) <= _FLAT * self._size or width <= _NARROW:
+                break
+        return best
 
-    def _on_branch(self, solutions: Real, tangents: Real) -> list[_Node]:
-        """Return the points of the branch: the work at all of them at once."""
-        workspace, point, system = self._workspace, self._point, self._workspace.balance.system
-        e, first = self._e, int(system.first_port[self._e])
-        rubbing = workspace.balance.scene.contacts[e].RUBBING
-        together = self._measure in (Measure.FRICTION_WORK, Measure.FRICTION_POWER) and rubbing
-        nodes: list[_Node] = []
-        forces = np.zeros((2, len(rubbing), len(solutions), point.F.shape[1]))
-        for i, (solution, tangent) in enumerate(zip(solutions, tangents, strict=True)):
-            p = float(solution[-1])
-            if i == 0 or not together:  # forces of contacts do not depend on the receptance
-                receptance(workspace.system, p, workspace.linear)
-            evaluate(workspace.system, workspace.linear, solution[:-1], p, 0.0, workspace.point)
-            if not together:
-                nodes.append(self._node(solution, tangent))
-                continue
-            dU = tangent[:-1].reshape(point.F.shape)
-            for j, a in enumerate(rubbing):
-                forces[0, j, i] = point.F[first + a]
-                forces[1, j, i] = tangent[-1] * point.dF_dp[first + a]
-                forces[1, j, i] += force_change(system, e, a, point.dF_dU, dU)
-        if not together:
-            return nodes
-        values, slopes = np.zeros(len(solutions)), np.zeros(len(solutions))
-        for j, a in enumerate(rubbing):
-            motions = [
-                rows[:, :-1].reshape(-1, *point.F.shape)[:, first + a] for rows in (solutions, tangents)
-            ]
-            done, rises = work_of(motions[0], forces[0, j], motions[1], forces[1, j], system.ks)
-            values, slopes = values + done, slopes + rises
-        values, slopes = self._rated(values, slopes, solutions[:, -1], tangents[:, -1])
-        known = np.isfinite(values)
-        values, slopes = np.where(known, values, -math.inf), np.where(known, slopes, 0.0)
-        return [
-            _Node(*each)
-            for each in zip(solutions, tangents, values.tolist(), slopes.tolist(), strict=True)
-        ]  # fmt: skip
+    def _worst(self, row: int, *, interior: bool) -> WorstWear:
+        solution = self._solver.table.solutions[row]
+        at = float(self._solver.workspace.balance.parameter.outside(float(solution[-1])))
+        value = self._sign * float(self._known()[row, 0])
+        return WorstWear(value=value, at=at, solution=solution[:-1].copy(), interior=interior)
 
-    def _by_share(self, left: _Node, right: _Node) -> tuple[float, float]:
-        """Return what turns both tangents into derivatives by the share of the chord between them."""
-        ends = left.solution, right.solution, left.tangent, right.tangent
-        return share_scales(*ends, self._workspace.balance.system.least_size)
+    def _measured(self, solutions: Real, tangents: Real) -> Real:
+        """Return the number that is made largest at points, and its slope along the tangent, (P, 2)."""
+        workspace = self._solver.workspace
+        balance = workspace.balance
+        solutions, tangents = np.ascontiguousarray(solutions), np.ascontiguousarray(tangents)
+        if self._works:
+            works, slopes = np.empty((2, len(solutions)))
+            rubbing = np.array(balance.scene.contacts[self._e].RUBBING, np.int64)
+            friction_works(
+                workspace.system, workspace.point, self._e, rubbing, solutions, tangents, works, slopes
+            )
+        else:
+            measured = map(self._by_cycle, solutions, tangents)
+            works, slopes = self._sign * np.array(list(measured)).reshape(-1, 2).T
+        if self._measure is Measure.FRICTION_POWER:
+            frequency = balance.parameter.kind is Kind.FREQUENCY
+            omega, rise = (solutions[:, -1], tangents[:, -1]) if frequency else (balance.system.omega, 0.0)
+            works, slopes = works * omega / TWO_PI, (slopes * omega + works * rise) / TWO_PI
+        found = np.stack([works, slopes], axis=1)
+        found[~np.isfinite(works)] = -math.inf, 0.0
+        return found
 
-    def _between(self, left: _Node, right: _Node, share: float) -> _Node | None:
-        """Return the solution at a share of the chord, its slope by the share; None if there is none."""
-        workspace, by_share = self._workspace, self._by_share(left, right)
-        found, tangent = np.zeros(left.solution.size), np.zeros(left.solution.size)
-        observed, values = np.zeros(workspace.balance.n_coefficients), np.zeros(MEASURES)
-        good, _ = between(
-            workspace.system, workspace.linear, workspace.point, left.solution, left.tangent * by_share[0],
-            right.solution, right.tangent * by_share[1], share, _MOST_ITERATIONS, found, tangent, observed,
-            values,
-        )  # fmt: skip
-        # It leaves the workspace evaluated at the solution found.
-        return self._node(found, tangent) if good else None
-
-    def _rated(self, value: Number, slope: Number, p: Number, dp: Number) -> tuple[Number, Number]:
-        """Return a number of a period as it is or, of a power, in a second, with its slope along dλ = dp."""
-        if self._measure is not Measure.FRICTION_POWER:
-            return value, slope
-        if self._workspace.balance.parameter.kind is not Kind.FREQUENCY:
-            rate = self._workspace.balance.system.omega / (2.0 * math.pi)
-            return value * rate, slope * rate
-        return value * p / (2.0 * math.pi), (slope * p + value * dp) / (2.0 * math.pi)
-
-    def _node(self, solution: Real, tangent: Real) -> _Node:
-        """Measure the contact where the workspace was evaluated last."""
-        balance, point, dp = self._workspace.balance, self._point, float(tangent[-1])
-        table, load, dtable, dload = self._fixed or contact_values(balance.system, float(solution[-1]), 0.0)
-        cycle = ContactCycle(
-            balance=balance, U=solution[:-1].reshape(point.F.shape), F=point.F, dF_dU=point.dF_dU,
-            table=table, load=load,
-        )  # fmt: skip
+    def _by_cycle(self, solution: Real, tangent: Real) -> tuple[float, float]:
+        """Measure the contact at a point, by its whole cycle."""
+        workspace, p, dp = self._solver.workspace, float(solution[-1]), float(tangent[-1])
+        balance, point = workspace.balance, evaluation_by_value(workspace.point)
+        evaluate_contacts(workspace.system, solution[:-1], p, 0.0, False, workspace.point)
+        _, _, row, load = contact_values(balance.system, p, 0.0)
         along = Change(
-            dU=tangent[:-1].reshape(point.F.shape), dF=dp * point.dF_dp, row=dp * dtable, load=dp * dload
+            dU=tangent[:-1].reshape(point.F.shape), dF=dp * point.dF_dp, row=dp * row, load=dp * load
         )
-        found = _MEASURES[self._measure](cycle, self._e, [along])
+        cycle = ContactCycle.of(balance, solution[:-1], p, point)
+        found = _BY_CYCLE[self._measure](cycle, self._e, [along])
         if found is None:
             name = balance.scene.contacts[self._e].name
             raise SettingError("contact", name, f"must be one whose law has a {self._measure.value}")
-        value, slope = self._sign * found[0], self._sign * float(found[1][0])
-        value, slope = self._rated(value, slope, float(solution[-1]), dp)
-        if not math.isfinite(value):
-            value, slope = -math.inf, 0.0
-        return _Node(solution, tangent, value, slope)
+        return found[0], float(found[1][0])
 
 
 def worst_slopes(
@@ -339,12 +302,8 @@ def _measured(
     sensitivity: WearSensitivity, at_hz: float, solution: Real, contact: str, measure: Measure
 ) -> Measured:  # fmt: skip
     point = sensitivity.at(at_hz, solution)
-    found = {
-        Measure.FRICTION_WORK: point.work,
-        Measure.FRICTION_POWER: point.work,
-        Measure.LEAST_LOAD: point.least_load,
-        Measure.SLIP_TRAVEL: point.travel,
-    }[measure](contact)
+    others = {Measure.LEAST_LOAD: point.least_load, Measure.SLIP_TRAVEL: point.travel}
+    found = others.get(measure, point.work)(contact)
     if found is None:
         raise SettingError("contact", contact, f"must be one whose law has a {measure.value}")
     if measure is not Measure.FRICTION_POWER:

@@ -16,7 +16,7 @@ from solver.contacts.kernels.laws import call_law
 from solver.contacts.kernels.stick_slip_events import FAILED, SEPARATED, STUCK, UNLOADED
 from solver.contacts.kernels.system import FREQUENCY, LEVEL, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Complex, Real, coefficient_count, cosine_position, magnitude
+from solver.jit.fourier import Complex, Integer, Real, coefficient_count, cosine_position, magnitude
 from solver.jit.lapack import copy_block, fill
 from solver.jit.separate import apart
 from solver.linear.kernels.receptance import driven_motions, goes_through_modes, modal_responses, receptance
@@ -67,6 +67,7 @@ def _swing(row: Real) -> float:
 
 
 _CANCELLED, _LOST = 1e-3, 1e-5  # shares of |A| |F| and |A| |dF/dU| |u| a residual is relative to at least
+_NO_WORK = 1e-13  # share of its terms below which a work is 0
 
 
 @apart
@@ -350,3 +351,45 @@ def _residual(
             worst = max(worst, residual / scale if scale > 0.0 else residual)
     # `max` passes over NaN, a sum does not.
     return worst if math.isfinite(check) else np.nan
+
+
+@apart
+def friction_works(
+    system: System, point: Evaluation, e: int, rubbing: Integer, solutions: Real, tangents: Real,
+    works: Real, slopes: Real,
+) -> None:  # fmt: skip
+    """Fill in the work that friction takes out at contact `e` in a period [J], at points of a branch.
+
+    Parameters
+    ----------
+    rubbing : the ports of the contact, counted from its first, along which it rubs.
+    solutions, tangents : (P, nt + 1), λ last; works, slopes : (P,) filled, −inf and 0 where the law fails.
+    """
+    n, ks, first, block = coefficient_count(system.ks), system.ks, system.first_port[e], system.first_block[e]
+    ports, last, begin = system.first_port[e + 1] - first, solutions.shape[1] - 1, 1 if ks[0] == 0 else 0
+    for i in range(solutions.shape[0]):
+        u, du, p = solutions[i, :last], tangents[i], solutions[i, last]
+        table, load, slope, dload = contact_values(system, p, 0.0)
+        works[i], slopes[i] = 0.0, 0.0
+        if not element(system, e, u, table[e], load[e], slope[e], dload[e], False, point):
+            works[i] = -math.inf
+            continue
+        for a in rubbing:
+            done, size, rise = 0.0, 0.0, 0.0
+            for j in range(begin, n):
+                # F·dU/dτ: the cosine of the force meets the sine of the motion, and the other way round.
+                k = float(ks[begin + (j - begin) // 2])
+                order, other = (k, j + 1) if (j - begin) % 2 == 0 else (-k, j - 1)
+                force, at = point.F[first + a, j], (first + a) * n + other
+                change = du[last] * point.dF_dp[first + a, j]
+                for b in range(ports):
+                    for m in range(n):
+                        change += point.dF_dU[block + a * ports + b, j, m] * du[(first + b) * n + m]
+                done += force * order * u[at]
+                size += abs(force * order * u[at])
+                rise += order * (change * u[at] + force * du[at])
+            if abs(done) > _NO_WORK * size:
+                works[i] += math.pi * done
+                slopes[i] += math.pi * rise
+        if not math.isfinite(works[i]):
+            works[i], slopes[i] = -math.inf, 0.0

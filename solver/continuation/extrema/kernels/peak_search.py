@@ -50,7 +50,7 @@ _COMPETES = 0.5  # share of the highest from which a maximum is polished to the 
 _SHARP, _ENOUGH = 1e-10, 1e-5  # slope relative to that of the interval at which a maximum is found
 NEAR_THE_TOP = 0.97  # share of the highest point from which the branch has to be dense
 PREDICTED = 1e-4  # relative error of the cubics up to which it is
-_SURE = 0.03  # share of that up to which the error the neighbours suggest needs no solution to tell it
+SURE = 0.03  # share of that up to which the error the neighbours suggest needs no solution to tell it
 MOST_HALVINGS = 5
 # Elsewhere: each makes the error of a cubic 16 times smaller, and a kink needs no more.
 _COARSE_HALVINGS = 4
@@ -112,7 +112,7 @@ def _densify(nodes: Nodes, worth: float) -> None:
     off = np.full(seen.reach.size, np.inf)
     for j in range(off.size):
         same = seen.measures[j, PIECE] == seen.measures[j + 1, PIECE]
-        if same and seen.error[j] <= _SURE * PREDICTED * top:
+        if same and seen.error[j] <= SURE * PREDICTED * top:
             off[j] = 0.0
     for _ in range(MOST_HALVINGS):
         wanted = (seen.reach >= NEAR_THE_TOP * top) & (off > PREDICTED * top)
