@@ -369,6 +369,8 @@ class Samples:
         self.apart = APART.get(n, APART_MANY)
         self.off = 0.0  # natural logarithm by which the look's harmonics are off
         self._slack = 0.0  # relative excess over limits that they show of designs that keep them
+        self._of = True, 0.0, 0.0  # whether no design keeps all limits, slack and scale, of the models
+        self._models: list[Taylor] = []  # of the designs seen, in their order
         self._found = found
 
     @property
@@ -443,11 +445,14 @@ class Samples:
 
     def models(self) -> list[Taylor]:
         """Return what the designs of the look tell of others: of what is minimised, or of the limits."""
-        feasibility = self.infeasible()
-        models = [self.scout.model(e) for e in self.seen]
-        if not feasibility:
-            models = [replace(model, excess=model.excess - self._slack) for model in models]
-        return [taylor_of(model, feasibility=feasibility) for model in models]
+        of = self.infeasible(), self._slack, self.scout.model(self.seen[0]).unit
+        if of != self._of:
+            self._of, self._models = of, []
+        for one in self.seen[len(self._models) :]:
+            model = self.scout.model(one)
+            model = model if of[0] else replace(model, excess=model.excess - of[1])
+            self._models.append(taylor_of(model, feasibility=of[0]))
+        return self._models
 
     def where_kept(self) -> None:
         """Look wherever the limits may be kept, until they are or nothing is left to look at."""

@@ -448,7 +448,8 @@ class Taylor:
     @property
     def value(self) -> float:
         """The number here."""
-        return float(self.at(self.place[None, :])[0])
+        limited = 0.0 if self.limited is None else self.price * max(float(self.limited[0].max()), 0.0)
+        return limited + sum(float(values.max()) for values, _ in self.groups)
 
     def at(self, places: Real) -> Real:
         """Return the predictions at (k, n) places."""
