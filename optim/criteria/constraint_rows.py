@@ -32,6 +32,18 @@ class CaseResponse:
     branch: Branch
     shared: bool = False
 
+    def whole(self, limit: float | None) -> CaseResponse:
+        """Return it looked at wholly, if it was not; its band is above `limit` [m]."""
+        from solver.continuation.branches.observation import observing
+        from solver.continuation.branches.sweep import with_error
+
+        branch, seen = self.branch, self.branch.scene.observe
+        if self.shared or math.isfinite(branch.error_estimate) or not branch.peaks:
+            return replace(self, branch=with_error(branch))
+        found = observing(branch, seen.dof, measure=seen.measure, limit=limit)
+        spent = branch.newton_iterations + found.newton_iterations
+        return replace(self, branch=replace(found, newton_iterations=spent))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignEvaluation:
@@ -121,12 +133,9 @@ class DesignEvaluation:
         """The name of each case with how well the peak of its response over its band is known."""
         return [(case, branch.known) for case, branch in self.over_bands.items() if branch.peak is not None]
 
-    def with_errors(self) -> DesignEvaluation:
-        """Return it with the errors of its peaks estimated, where a search left that out."""
-        from solver.continuation.branches.sweep import with_error
-
-        done = tuple(replace(one, branch=with_error(one.branch)) for one in self.responses)
-        return replace(self, responses=done)
+    def with_errors(self, limit: float | None = None) -> DesignEvaluation:
+        """Return it with low peaks, bands above `limit` [m] and errors, where a search left these out."""
+        return replace(self, responses=tuple(one.whole(limit) for one in self.responses))
 
     def violation(self, scales: Mapping[Criterion, float]) -> float:
         """Return the largest relative excess over a bound; −inf without bounds."""

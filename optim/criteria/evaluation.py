@@ -18,6 +18,7 @@ from solver.balance.simplifications import Effects
 from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
+from solver.continuation.extrema.kernels.node_table import WORTH_POLISHING
 from solver.continuation.stretches import Course
 from solver.continuation.walk import ContinuationSettings
 from solver.results.watch import ShouldStop
@@ -25,8 +26,8 @@ from solver.scene.scene import Scene
 from solver.scene.scene_harmonics import even_harmonics_reason
 from solver.studies.peaks.peak_lines import fitted
 
-# A response that does not cover its range tells a design nothing; a usual one has 80 to 800 points.
-SETTINGS = ContinuationSettings(most_points=4000, unfinished_peaks=False)
+# A usual response has 80 to 800 points, and no criterion looks at peaks below this share of the highest.
+SETTINGS = ContinuationSettings(most_points=4000, unfinished_peaks=False, competes=0.5)
 
 _LOST = (BranchStatus.NO_START, BranchStatus.STALLED, BranchStatus.TURNED_BACK)
 
@@ -42,7 +43,7 @@ def evaluate(
     problem : what is judged.
     values : the design, variable name to value.
     gradients : compute them (otherwise they are NaN).
-    errors : estimate those of the peaks; `Evaluation.with_errors` does it later if not.
+    errors : look for low peaks too, and estimate errors; `DesignEvaluation.with_errors` does it later if not.
     should_stop : asked while the responses are computed.
     before : the same design by another measure, whose responses serve here, or with other harmonics, whose
         responses begin where these do.
@@ -59,6 +60,7 @@ def evaluate(
         earlier = [] if before is None else [one.branch for one in before.responses if one.case == case.name]
         highest = most / max(problem.weights[PEAK] * case.weight, 1e-300)
         settings = replace(SETTINGS, errors=errors, highest=highest)
+        settings = replace(settings, competes=WORTH_POLISHING) if errors else settings
         found = _case(problem, case, values, known, earlier, gradients, settings, should_stop)
         responses += found[0]
         rows += found[1]

@@ -491,7 +491,7 @@ class DesignResult(MadeOfResponses, Drawn):
         """Return it with the errors of the peaks of the optimum estimated; a search leaves that out."""
         if self.evaluation is None:
             return self
-        found = self.evaluation.with_errors()
+        found = self.evaluation.with_errors(self.problem.limit)
         history = tuple(found if one is self.evaluation else one for one in self.history)
         return replace(self, evaluation=found, history=history)
 

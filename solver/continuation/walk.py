@@ -116,6 +116,8 @@ class ContinuationSettings:
         Whether peaks and the band are looked for between the points; without them the branch has none.
     unfinished_peaks : bool
         Whether they are on a branch that does not reach its end, too.
+    competes : float
+        Share of the highest point below which no peak is looked for, unless the limit of the band is lower.
     errors : bool
         Whether the error of the highest peak is estimated;
         `solver.continuation.branches.sweep.with_error` does it later if not.
@@ -133,6 +135,7 @@ class ContinuationSettings:
     highest: float = math.inf
     peaks: bool = True
     unfinished_peaks: bool = True
+    competes: float = 5e-3
     errors: bool = True
 
     @property

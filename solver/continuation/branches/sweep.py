@@ -29,7 +29,7 @@ from solver.continuation.branches.point_by_point import is_unique, rows_before_a
 from solver.continuation.branches.symmetry_breaking import branch_flags
 from solver.continuation.extrema.branch_error import branch_error, nothing_damps
 from solver.continuation.extrema.extrema import Survey, band_limit
-from solver.continuation.extrema.kernels.node_table import PointRow
+from solver.continuation.extrema.kernels.node_table import WORTH_POLISHING, PointRow
 from solver.continuation.extrema.nodes import NodeSolver
 from solver.continuation.from_nothing import solve_from_nothing
 from solver.continuation.kernels import walk_state as walk_states
@@ -170,7 +170,8 @@ def _swept(
         status = BranchStatus.TOO_STIFF
     peaks = settings.peaks and (settings.unfinished_peaks or status is BranchStatus.COMPLETED)
     earlier = 0.0 if course.resume is None else course.resume.seconds
-    branch = _finish(workspace, stretches, status, first, last, limit, begun - earlier, peaks=peaks)
+    competes = settings.competes if peaks else math.inf
+    branch = _finish(workspace, stretches, status, first, last, limit, begun - earlier, competes)
     if settings.errors:
         branch = with_error(branch, workspace)
     if on_progress is not None and branch.reached:
@@ -267,9 +268,9 @@ def _no_start(balance: Balance, iterations: int, begun: float, status: BranchSta
 
 def _finish(
     workspace: Workspace, stretches: list[Stretch], status: BranchStatus, start: float, stop: float,
-    limit: float | None, begun: float, *, peaks: bool,
+    limit: float | None, begun: float, competes: float,
 ) -> Branch:  # fmt: skip
-    """Put the stretches together; with `peaks` polish these and measure the band."""
+    """Put the stretches together, polish the peaks that compete, and measure the band."""
     balance = workspace.balance
     whole = joined(stretches)
     inside = balance.parameter.inside
@@ -279,12 +280,14 @@ def _finish(
         lost and ends_undamped(workspace, whole.solutions, inside(start))
     ):
         status = BranchStatus.UNDAMPED
-    peaks = peaks and status is not BranchStatus.UNDAMPED
     branch = replace(
         without_peaks(balance, whole, status, start, stop), newton_iterations=whole.newton_iterations,
         rejected_steps=whole.rejected_steps, stepped_over=whole.stepped_over,
     )  # fmt: skip
-    branch = surveyed(branch, Survey.of(workspace, whole), limit) if peaks else branch
+    if status is not BranchStatus.UNDAMPED and competes < math.inf:
+        top = float(whole.measures[:, MAX_ABS].max(initial=0.0))
+        worth = competes if limit is None else min(competes, limit / max(top, limit))
+        branch = surveyed(branch, Survey.of(workspace, whole, max(worth, WORTH_POLISHING)), limit)
     flags = branch_flags(workspace, branch.solutions), _drive_flags(workspace, whole, status, start, stop)
     return replace(branch, flags=flags[0] + flags[1], seconds=clock() - begun)
 

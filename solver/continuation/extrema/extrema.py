@@ -95,27 +95,28 @@ class Survey:
     order : rows of its table along the branch, all of them in their order if left out.
     highest_alone : whether the highest peak is all that is wanted. Then the branch is made dense where that
         may stand alone, and the points may be as far apart as those of `solver.continuation.branches.sweep`.
+    worth : share of the highest point below which nothing stands that is looked for.
     """
 
     def __init__(
-        self, solver: NodeSolver, order: Integer | None = None, *, highest_alone: bool = False
-    ) -> None:
+        self, solver: NodeSolver, order: Integer | None = None, *, highest_alone: bool = False,
+        worth: float = WORTH_POLISHING,
+    ) -> None:  # fmt: skip
         self._solver, self._search = solver, Search()
         self._balance = balance = solver.workspace.balance
         solver.begin(order)
-        # Share of the highest point below which nothing stands that is looked for.
-        worth = COMPETES_FOR_HIGHEST if highest_alone else WORTH_POLISHING
+        worth = COMPETES_FOR_HIGHEST if highest_alone else worth
         if solver.order.size:
             solver.run(settle_changes, worth, highest_alone)
             if solver.order.size > 1 and ClosedLoop.serves(balance):
-                self._search = ResonanceSearch(solver, worth if highest_alone else 0.0).run()
+                self._search = ResonanceSearch(solver, worth if worth > WORTH_POLISHING else 0.0).run()
             solver.run(find_peaks, worth, highest_alone)
         self.order: Integer = solver.order  # rows of the table, with what was solved for between the points
 
     @classmethod
-    def of(cls, workspace: Workspace, points: Points) -> Survey:
+    def of(cls, workspace: Workspace, points: Points, worth: float = WORTH_POLISHING) -> Survey:
         """Return the survey of a branch."""
-        return cls(NodeSolver(workspace, points))
+        return cls(NodeSolver(workspace, points), worth=worth)
 
     @property
     def spent(self) -> int:
