@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -51,7 +52,7 @@ AHEAD = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # of the range, where it is looked why a
 
 _STRETCH = Pace(first=64, least=1, largest=64)  # points between two looks at the caller
 _SHORT_STRETCH = 4  # the first of them where a point may take long
-_LARGE = 400  # unknowns from which it may
+_LARGE = 200  # unknowns from which it may
 _STRETCH_SECONDS = 0.5
 _ENDINGS = {
     walk_states.FINISHED: BranchStatus.COMPLETED,
@@ -229,8 +230,26 @@ def stands_still(points: Real, control: Control) -> bool:
     return bool(moved.max(initial=0.0) <= STILL * size)
 
 
+Ahead = Callable[[float], PointSolution | None]
+"""To the solution at such a share of the range further on; None beyond it, and where no part may drift."""
+
+
+def ahead_of(workspace: Workspace, last: Real, control: Control) -> Ahead:
+    """Return what solves behind the last point of a branch, at each place once: a search takes long."""
+    p, span = float(last[-1, -1]), control.stop - control.start
+
+    @cache
+    def solved(share: float) -> PointSolution | None:
+        beyond = (p + share * span - control.stop) * span > 0.0
+        if beyond or not len(workspace.balance.system.loose):
+            return None
+        return workspace.solve(p + share * span, last[-1, :-1], quick=True)
+
+    return solved
+
+
 def taken_up(
-    workspace: Workspace, control: Control, state: walk_states.Walk, last: Real
+    workspace: Workspace, control: Control, state: walk_states.Walk, last: Real, ahead: Ahead
 ) -> walk_states.Walk | None:
     """Return the branch taken up a little further on, if a mean that nothing held is all that moves.
 
@@ -238,40 +257,26 @@ def taken_up(
     the part stood while nothing held it.
     """
     balance, span = workspace.balance, control.stop - control.start
-    if not len(balance.system.loose) or len(last) < 2 or (last[-1, -1] - last[-2, -1]) * span <= 0.0:
+    if len(last) < 2 or (last[-1, -1] - last[-2, -1]) * span <= 0.0:
         return None
     before = last[-1, :-1].reshape(balance.n_ports, -1)[:, 1:]
     for share in AHEAD[:3]:
-        p = float(last[-1, -1]) + share * span
-        if (p - control.stop) * span >= 0.0:
+        found = ahead(share)
+        if found is None:
             return None
-        found = workspace.solve(p, last[-1, :-1], quick=True)
         if not found.converged:
             continue
         moved = np.abs(found.u.reshape(balance.n_ports, -1)[:, 1:] - before).max()
         if moved > NEIGHBOUR * max(np.abs(before).max(), np.finfo(float).tiny):
             continue
-        code, again = begin_walk(
-            workspace.system, workspace.linear, workspace.point, control._replace(start=p), found.u
-        )
+        begun = control._replace(start=float(last[-1, -1]) + share * span)
+        code, again = begin_walk(workspace.system, workspace.linear, workspace.point, begun, found.u)
         numbers, old = walk_by_value(again).numbers, walk_by_value(state).numbers
         for each in (walk_states.ITERATIONS, walk_states.REJECTED, walk_states.STEPPED_OVER):
             numbers[each] += old[each]
         numbers[walk_states.STEPPED_OVER] += 1
         return again if code == walk_states.RUNNING else None
     return None
-
-
-def ratchets_ahead(workspace: Workspace, state: walk_states.Walk, control: Control) -> bool:
-    """Return whether there is no periodic motion a little further on because a part drifts away."""
-    if not len(workspace.balance.system.loose):
-        return False
-    here, span = walk_by_value(state), control.stop - control.start
-    for share in AHEAD:
-        p = float(here.numbers[walk_states.P]) + share * span
-        if (p - control.stop) * span <= 0.0 and workspace.solve(p, here.u, quick=True).ratchets:
-            return True
-    return False
 
 
 def control_of(settings: ContinuationSettings, start: float, stop: float, pace: Pace) -> Control:
@@ -326,10 +331,11 @@ class BranchStretches(Curve[Stretch]):
             code = walk_states.STALLED
         status, again = _ENDINGS.get(code), None
         if status is BranchStatus.STALLED:
-            again = taken_up(workspace, control, state, last)
+            ahead = ahead_of(workspace, last, control)
+            again = taken_up(workspace, control, state, last, ahead)
             if again is not None:
                 status, code = None, walk_states.RUNNING
-            elif ratchets_ahead(workspace, state, control):
+            elif any(found is not None and found.ratchets for found in map(ahead, AHEAD)):  # a part drifts
                 status = BranchStatus.RATCHETS
         stretch = balanced_part(workspace, self._stretch(rows, count, status))
         self._code, self._status, self._state = code, stretch.status, state if again is None else again
