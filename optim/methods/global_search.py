@@ -43,6 +43,7 @@ from optim.problem.variables import Real, scaled, snapped, unscaled
 from optim.results.design_result import DesignStatus
 
 PATIENCE = 20  # designs of a local search, after which it ends if it is far behind the best end
+LITTLE = 1e-5  # relative gain; two such in a row, far behind the best end, and a search is at its own
 FAR_OFF = 0.01  # relative excess over a limit that is
 IDLE = 3  # rounds in a row that find nothing, after which a look is finished
 IDLE_MANY = 2  # the same with more than two variables
@@ -85,6 +86,7 @@ class GlobalSearch:
         self._samples = Samples(search, self.found, seen)
         self._starts: list[Real] = []
         self._ends: list[tuple[Local, DesignEvaluation]] = []  # with the numbers of the look
+        self._apart: list[Real] = []  # from where it was looked whether a search leads to one of them
 
     @property
     def looked_at(self) -> tuple[DesignEvaluation, ...]:
@@ -185,8 +187,9 @@ class GlobalSearch:
                 ends.append(self._ended(here))
             if not ends or ends[0].feasible:
                 ends.append(self._ended(self._local(here, self.search.model, watched)))
-        except JoinedError:
-            joined = True
+        except JoinedError as left:
+            joined = left.end is None
+            ends += [] if left.end is None else [self._ended(left.end)]
         seen = min((begin, here, *watched.best), key=self._standing)
         known = min([self._best(), *(local.standing for local in ends if not joined)])
         if self._standing(seen)[0] == 0.0 and _beats(self._standing(seen), known):
@@ -196,6 +199,7 @@ class GlobalSearch:
             return
         best = min(ends, key=lambda local: local.standing)
         self.found.append(best)
+        self._apart.clear()
         there = self._samples.ended(best)
         if there is not None:
             self._ends.append((best, there))
@@ -207,9 +211,7 @@ class GlobalSearch:
     def _standing(self, there: DesignEvaluation) -> tuple[float, float]:
         return standing(self.search.model(there))
 
-    def _thorough(
-        self, begin: DesignEvaluation, evaluate: Evaluate, model_of: ModelOf, **more: Any
-    ) -> Local:  # fmt: skip
+    def _thorough(self, begin: DesignEvaluation, evaluate: Evaluate, model_of: ModelOf, **more: Any) -> Local:
         from optim.methods.minimax import thorough_search
 
         return thorough_search(evaluate, self.search.variables, begin, model_of, **more)
@@ -217,9 +219,7 @@ class GlobalSearch:
     def _local(
         self, begin: DesignEvaluation, model_of: ModelOf, evaluate: Evaluate | None = None
     ) -> DesignEvaluation:
-        return self._local_search(
-            evaluate or self.search, self.search.variables, begin, model_of
-        ).evaluation  # fmt: skip
+        return self._local_search(evaluate or self.search, self.search.variables, begin, model_of).evaluation
 
     def joins(self, here: DesignEvaluation) -> bool:
         """Return whether what is minimised falls all the way from a design to an end that is known.
@@ -236,6 +236,9 @@ class GlobalSearch:
             return False
         broken = not mine.feasible
         z = scaled(self.search.variables, here.values)
+        if any(np.abs(z - other).max() < self._samples.apart for other in self._apart):
+            return False  # it was looked at from there
+        self._apart.append(z)
         ways = [scaled(self.search.variables, local.evaluation.values) - z for local, _ in better]
         nearest = min(range(len(ways)), key=lambda i: float(np.abs(ways[i]).max()))
         way = ways[nearest]
@@ -256,9 +259,13 @@ class GlobalSearch:
 
     def behind(self, best: tuple[float, float]) -> bool:
         """Return whether a standing breaks limits that an end keeps, or leads far above all basins wanted."""
+        idle = self._distinct() >= self.search.problem.basins and self.far_behind(best)
+        return self._best()[0] == 0.0 and (best[0] > FAR_OFF or idle)
+
+    def far_behind(self, best: tuple[float, float]) -> bool:
+        """Return whether a standing is far above the best end, which keeps all limits."""
         violation, objective = self._best()
-        idle = self._distinct() >= self.search.problem.basins and best[1] > WORTH * objective
-        return violation == 0.0 and (best[0] > FAR_OFF or idle)
+        return violation == 0.0 and best[1] > WORTH * objective
 
     def _ended(self, there: DesignEvaluation) -> Local:
         return ended(there, self.search.model(there), self.search.variables)
@@ -308,7 +315,11 @@ class GlobalSearch:
 
 
 class JoinedError(Exception):
-    """A local search leads to an end that is known, or stays far behind it."""
+    """A local search leads to an end that is known, or stays far behind it; `end`: its own, as good as."""
+
+    def __init__(self, end: DesignEvaluation | None = None) -> None:
+        self.end = end
+        super().__init__()
 
 
 class _Watched:
@@ -316,6 +327,7 @@ class _Watched:
 
     def __init__(self, whole: GlobalSearch) -> None:
         self._whole, self._best, self._better, self._count = whole, (math.inf, math.inf), 0, 0
+        self._little = 0  # gains in a row that were
         self.best: list[DesignEvaluation] = []  # the best seen
 
     def __call__(self, values: Mapping[str, float]) -> DesignEvaluation:
@@ -332,7 +344,10 @@ class _Watched:
             return found
         here = standing(self._whole.search.model(found))
         if here < self._best:
+            self._little = self._little + 1 if self._best[1] - here[1] <= LITTLE * here[1] else 0
             self._best, self._better, self.best = here, self._better + 1, [found]
+            if self._little > 1 and here[0] == 0.0 and self._whole.far_behind(here):
+                raise JoinedError(found)
             if self._better % LOOK_AHEAD == 0 and self._whole.joins(found):
                 raise JoinedError
         if self._count >= PATIENCE and self._whole.behind(self._best):
