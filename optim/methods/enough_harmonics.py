@@ -30,6 +30,7 @@ MOST_HARMONICS = 60  # beyond that a design is not looked at with more
 HOPELESS = 2.0  # times what is well known: doubts foretold above it are not looked at
 _RUNGS = 4  # times the harmonics asked for, at most: more of them cost more than a search was asked to
 NO_MEAN = 1e-6  # share by which max|x| is above half peak to peak where there is no mean
+_AMID = (0.5, 0.75, 0.25)  # shares of the range where the first response is looked for
 _FEW = 24  # harmonics that a search may have though it was asked for fewer
 
 
@@ -149,7 +150,7 @@ def with_enough(
 def by_first_response(
     problem: Problem, should_stop: ShouldStop
 ) -> tuple[Problem, tuple[DesignEvaluation, ...]]:
-    """Return the problem by the measure that a response amid the range asks for, and that response.
+    """Return the problem by the measure that a response amid the range asks for, and what was looked at.
 
     Where contacts alone hold a part its mean is free at nearly every design: what a search by max|x| finds
     would be searched for again by half peak to peak. Elsewhere no response is computed.
@@ -157,10 +158,14 @@ def by_first_response(
     floats = any(loose_ports(case.scene)[0].size for case in problem.cases)
     if not floats or problem.keeps_measure or problem.method not in (Method.AUTO, Method.MINIMAX):
         return problem, ()
-    middle = {variable.name: variable.outside(0.5) for variable in problem.variables}
-    start = middle if problem.start is None else dict(problem.start)
-    found = evaluate(problem, start, gradients=False, errors=False, should_stop=should_stop)
-    return _by_its_measure(problem, found) if found.good else problem, (found,)
+    starts = [{one.name: one.outside(share) for one in problem.variables} for share in _AMID]
+    tried = list[DesignEvaluation]()
+    for start in starts if problem.start is None else [dict(problem.start), *starts]:
+        found = evaluate(problem, start, gradients=False, errors=False, should_stop=should_stop)
+        tried.append(found)
+        if found.good:
+            return _by_its_measure(problem, found), tuple(tried)
+    return problem, tuple(tried)
 
 
 def mean_is_free(evaluation: DesignEvaluation) -> bool:
