@@ -103,9 +103,7 @@ def _case(
     return responses, rows
 
 
-def _begin(
-    problem: Problem, scene: Scene, effects: Effects, branch: Branch, down: bool
-) -> Course | None:  # fmt: skip
+def _begin(problem: Problem, scene: Scene, effects: Effects, branch: Branch, down: bool) -> Course | None:
     """Return where a response begins, by that of the same design with other harmonics."""
     if not len(branch.solutions):
         return None

@@ -147,9 +147,7 @@ def strong_correlations(unknowns: Unknowns, known: Information) -> tuple[tuple[s
     return tuple(found)
 
 
-def _one(
-    scene: Scene, unknowns: Unknowns, z: Real, direction: Real, seen: Mapping[str, set[int]]
-) -> Untold:  # fmt: skip
+def _one(scene: Scene, unknowns: Unknowns, z: Real, direction: Real, seen: Mapping[str, set[int]]) -> Untold:
     at = [i for i in np.argsort(-np.abs(direction)) if abs(direction[i]) > _SHARE]
     names = tuple(unknowns.names[i] for i in at)
     if len(at) == 1:

@@ -146,9 +146,7 @@ def tracked_starts(
         if problem.peak_alone
     ]
     for one in (single for single in singles if single.why_not_tracked is None):
-        tracked = plain or tracked_optimum(
-            one, on_progress=search.tracking, should_stop=search.should_stop
-        )  # fmt: skip
+        tracked = plain or tracked_optimum(one, on_progress=search.tracking, should_stop=search.should_stop)
         search.tracked(tracked.evaluations)
         starts += [dict(basin.values) for basin in tracked.basins]
         if len(problem.cases) == 1 and tracked.status in _OPTIMAL and starts:

@@ -23,9 +23,7 @@ class DesignError(SettingError):
     place : where that stands, if not where the name says.
     """
 
-    def __init__(
-        self, name: str | Place, value: object, wanted: str, *, place: Place | None = None
-    ) -> None:  # fmt: skip
+    def __init__(self, name: str | Place, value: object, wanted: str, *, place: Place | None = None) -> None:
         super().__init__(name, value, wanted)
         self.place = self.issue.subject if place is None else place
         self.args = (self.issue.said(self.name),)

@@ -267,9 +267,7 @@ class PointsOfFront(ProblemKeys):
     points: Annotated[
         Annotated[int, Field(strict=True, ge=FEWEST_POINTS, le=200)] | None,
         Option(Form.WHOLE_NUMBER, "--points", "N", help=f"Points of the front, {POINTS} if left out."),
-    ] = Field(
-        default=None, description=f"Points of the front looked for, both ends included; {POINTS}."
-    )  # fmt: skip
+    ] = Field(default=None, description=f"Points of the front looked for, both ends included; {POINTS}.")
 
 
 Model = TypeVar("Model", bound=ProblemKeys)

@@ -152,9 +152,7 @@ class _Chain:
                     found = rows_of(problem, named, seen, over, gradients=gradients)
                     rows += [row for row in found if j == 0 or row.quantity.each_blade]
             return rows, len(ranges)
-        evaluation = evaluate(
-            problem, values, gradients=gradients, errors=False, should_stop=should_stop
-        )  # fmt: skip
+        evaluation = evaluate(problem, values, gradients=gradients, errors=False, should_stop=should_stop)
         return list(evaluation.rows), evaluation.computed
 
     def known(self, should_stop: ShouldStop) -> list[Known]:

@@ -58,9 +58,7 @@ def _over_level(balance: Balance, p: float) -> Balance | None:
     else:
         scene = scene.with_values({parameter.path: float(parameter.outside(p))})
     effects = replace(balance.effects, even_harmonics=int(balance.system.ks[0]) == 0)
-    other = build(
-        scene, AMPLITUDE, harmonics=balance.n_harmonics, frequency_hz=frequency_hz, effects=effects
-    )  # fmt: skip
+    other = build(scene, AMPLITUDE, harmonics=balance.n_harmonics, frequency_hz=frequency_hz, effects=effects)
     if not np.all(np.isin(balance.system.ks, other.system.ks)):
         return None
     other = with_harmonics(other, balance.system.ks)

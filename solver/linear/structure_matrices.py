@@ -284,9 +284,7 @@ def _at(structure: MatricesStructure, bodies: tuple[Body, ...], points: int, n: 
     K, C, M = _own(structure, n)
     if bodies or points:
         still, behind = np.zeros((points, points)), np.zeros((_behind(bodies, points),) * 2)
-        K, C, M = (
-            block_diag(K, behind), block_diag(C, behind), block_diag(M, bodies_mass(0, bodies), still)
-        )  # fmt: skip
+        K, C, M = (block_diag(K, behind), block_diag(C, behind), block_diag(M, bodies_mass(0, bodies), still))
     return frozen(K), frozen(C), frozen(M)
 
 

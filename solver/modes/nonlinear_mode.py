@@ -136,9 +136,7 @@ def pose(
         found = _begin(equations, mode)
     loads = [contact.load for contact in equations.balance.scene.contacts]
     turns = not any(load is not None and load.orders for load in loads)
-    return ModeProblem(
-        equations=equations, mode=found[0], rest=found[1], turns=turns, all_modes=found[2]
-    )  # fmt: skip
+    return ModeProblem(equations=equations, mode=found[0], rest=found[1], turns=turns, all_modes=found[2])
 
 
 def _balance(scene: Scene, harmonics: int, *, whole: bool, even: bool) -> Balance:

@@ -270,9 +270,7 @@ def _polished(means: WorstMean, values: Real, worst: Peak) -> Peak:
 class WorstMeanSlopes(Sensitivities):
     """Derivatives of the utilisation at the worst mean; of the one found where that is not free."""
 
-    def __init__(
-        self, balance: Balance, paths: Sequence[str], free: frozenset[int] | None = None
-    ) -> None:  # fmt: skip
+    def __init__(self, balance: Balance, paths: Sequence[str], free: frozenset[int] | None = None) -> None:
         super().__init__(balance, paths)
         self._means = WorstMean(balance, free)
 

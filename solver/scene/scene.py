@@ -344,9 +344,7 @@ class Scene(Part):
     def measured(self) -> Measured:
         """What amplitudes, peaks and limits are of, with its name and unit."""
         seen = self.observe
-        return Measured(
-            dof=seen.dof, measure=seen.measure, harmonic=seen.harmonic, unit=self.observed_unit
-        )  # fmt: skip
+        return Measured(dof=seen.dof, measure=seen.measure, harmonic=seen.harmonic, unit=self.observed_unit)
 
     @property
     def observed_unit(self) -> str:

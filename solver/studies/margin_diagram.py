@@ -87,9 +87,7 @@ def _of_row(branch: Branch, row: str) -> Used:
 class _DamperResponses:
     """Responses of one damper at levels of the excitation."""
 
-    def __init__(
-        self, scene: Scene, limit: float | None, harmonics: int, should_stop: ShouldStop
-    ) -> None:  # fmt: skip
+    def __init__(self, scene: Scene, limit: float | None, harmonics: int, should_stop: ShouldStop) -> None:
         self.scene, self._limit, self._harmonics, self._should_stop = scene, limit, harmonics, should_stop
         self._rows = judged_rows(scene)
         self.parts: list[Known] = []
@@ -212,9 +210,7 @@ def _allowed(
     return AllowedExcitation(name=name, allowed=amplitude, end=end, row=row, at_hz=hertz, value=value)
 
 
-def checked_dampers(
-    scene: Scene, dampers: Mapping[str, Mapping[str, float]] | None
-) -> dict[str, Scene]:  # fmt: skip
+def checked_dampers(scene: Scene, dampers: Mapping[str, Mapping[str, float]] | None) -> dict[str, Scene]:
     """Return the scene with each damper; raises SettingError as `margin_diagram`."""
     if dampers is None:
         return {AS_IT_IS: scene}
@@ -227,9 +223,7 @@ def checked_dampers(
     return found
 
 
-def checked_levels(
-    scene: Scene, start: float, stop: float, points: int, limit: float | None
-) -> np.ndarray:  # fmt: skip
+def checked_levels(scene: Scene, start: float, stop: float, points: int, limit: float | None) -> np.ndarray:
     """Return the levels of the excitation, (points,); raises SettingError as `margin_diagram`."""
     if not 0.0 < start < math.inf:
         raise SettingError("start", start, "must be an amplitude > 0")

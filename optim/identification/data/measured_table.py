@@ -214,9 +214,7 @@ class Table:
         """Return the refusal of a number."""
         shown = float(self.columns[column][row]) if value is None else value
         source = self.source if self.lines.size else f"{self.source}, row {row}"
-        return DataError(
-            source, shown, wanted, line=self.line(row), column=column, place=self.place
-        )  # fmt: skip
+        return DataError(source, shown, wanted, line=self.line(row), column=column, place=self.place)
 
     def refusal(self, value: object, wanted: str, column: str = "") -> DataError:
         """Return the refusal of the whole, or of a column."""

@@ -102,9 +102,7 @@ def _judged(
     error = estimate.half_peak_to_peak if loose else estimate.max_abs
     amplitude = float(measures.values[HALF_RANGE if loose else MAX_ABS]) if size is None else size
     excess = error / (accuracy * amplitude) if amplitude > 0.0 else 0.0 if error == 0.0 else math.inf
-    return _Attempt(
-        workspace=workspace, found=found, excess=excess if math.isfinite(excess) else math.inf
-    )  # fmt: skip
+    return _Attempt(workspace=workspace, found=found, excess=excess if math.isfinite(excess) else math.inf)
 
 
 def _fewest(first: _Attempt, p: float, accuracy: float, size: float | None = None) -> _Attempt:
@@ -133,9 +131,7 @@ def next_harmonics(harmonics: int, excess: float) -> int:
     return math.ceil(harmonics * min(max(growth, _LEAST_GROWTH), _MOST_GROWTH))
 
 
-def _with(
-    like: _Attempt, harmonics: int, p: float, accuracy: float, size: float | None
-) -> _Attempt | None:  # fmt: skip
+def _with(like: _Attempt, harmonics: int, p: float, accuracy: float, size: float | None) -> _Attempt | None:
     """Return the same response with another number of harmonics; None where Newton's method fails."""
     known = like.workspace.balance
     other = more_harmonics if harmonics >= known.n_harmonics else less_harmonics

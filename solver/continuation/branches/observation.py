@@ -113,9 +113,7 @@ def highest_peaks(branch: Branch, dofs: Sequence[str]) -> tuple[list[Peak], Bran
     return found, with_error(with_points(seen, points), workspaces[worst])
 
 
-def _workspaces(
-    branch: Branch, dofs: Sequence[str], measure: str | Haigh | None = None
-) -> list[Workspace]:  # fmt: skip
+def _workspaces(branch: Branch, dofs: Sequence[str], measure: str | Haigh | None = None) -> list[Workspace]:
     """Return a workspace with each DOF observed; all share what is known of the resonances."""
     workspaces = list[Workspace]()
     for dof in dofs:

@@ -25,9 +25,7 @@ if TYPE_CHECKING:
 
 SPEED = "speed"
 FORCE = "force"
-BODY_UNITS = {
-    "mass": "kg", **dict.fromkeys(MOMENTS, "kg m^2"), "radius_of_rotation": "m",
-}  # fmt: skip
+BODY_UNITS = {"mass": "kg", **dict.fromkeys(MOMENTS, "kg m^2"), "radius_of_rotation": "m"}
 
 
 def body_paths(scene: Scene) -> tuple[str, ...]:

@@ -53,9 +53,7 @@ class TrackStatus(Enum):
     @property
     def proven(self) -> bool:
         """Whether an optimum with this status is proven over the whole range."""
-        return self in (
-            TrackStatus.TRACKED, TrackStatus.AT_BOUND, TrackStatus.PLATEAU, TrackStatus.FLAT
-        )  # fmt: skip
+        return self in (TrackStatus.TRACKED, TrackStatus.AT_BOUND, TrackStatus.PLATEAU, TrackStatus.FLAT)
 
 
 class ChosenBy(Enum):

@@ -50,9 +50,7 @@ def step(u: float, v: float, du: float, dt: float, last: Real, state: Real, p: R
     return p[K] / (1.0 + beta) * total  # type: ignore[no-any-return]
 
 
-def slopes(
-    u: float, v: float, du: float, dt: float, last: Real, state: Real, p: Real, out: Real
-) -> None:  # fmt: skip
+def slopes(u: float, v: float, du: float, dt: float, last: Real, state: Real, p: Real, out: Real) -> None:
     """Fill the derivatives of sliders and force by the motion, the sliders and the parameters."""
     chi, beta = p[CHI], p[BETA]
     mean, scale, first = (chi + 1.0) / (chi + 2.0), p[K] / (1.0 + beta), 4 + SLIDERS + 1
