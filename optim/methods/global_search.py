@@ -125,8 +125,7 @@ class GlobalSearch:
             # Limits that do not bind must not make a search worse: begin from what is best without them.
             least = min(self._samples.seen, key=lambda e: e.objective)
             for begin in self._samples.exact([least]):
-                free = self._local(begin, lambda e: without_limits(self.search.model(e)))
-                self._descend(free)
+                self._descend(self._local(begin, lambda e: without_limits(self.search.model(e))).evaluation)
 
     def _everywhere(self) -> None:
         """Look wherever the limits may be kept before it is said that no design keeps them."""
@@ -186,7 +185,8 @@ class GlobalSearch:
                 ).evaluation  # fmt: skip
                 ends.append(self._ended(here))
             if not ends or ends[0].feasible:
-                ends.append(self._ended(self._local(here, self.search.model, watched)))
+                end = self._local(here, self.search.model, watched)
+                ends.append(replace(self._ended(end.evaluation), at_a_jump=end.at_a_jump))
         except JoinedError as left:
             joined = left.end is None
             ends += [] if left.end is None else [self._ended(left.end)]
@@ -216,10 +216,8 @@ class GlobalSearch:
 
         return thorough_search(evaluate, self.search.variables, begin, model_of, **more)
 
-    def _local(
-        self, begin: DesignEvaluation, model_of: ModelOf, evaluate: Evaluate | None = None
-    ) -> DesignEvaluation:
-        return self._local_search(evaluate or self.search, self.search.variables, begin, model_of).evaluation
+    def _local(self, begin: DesignEvaluation, model_of: ModelOf, evaluate: Evaluate | None = None) -> Local:
+        return self._local_search(evaluate or self.search, self.search.variables, begin, model_of)
 
     def joins(self, here: DesignEvaluation) -> bool:
         """Return whether what is minimised falls all the way from a design to an end that is known.
@@ -307,7 +305,7 @@ class GlobalSearch:
                 break
             self._descend(best)
         end = min(self.found, key=lambda local: local.standing)
-        if not end.settled:
+        if not (end.settled or end.at_a_jump):
             better = polished(self.search, end)
             self.found.append(better)
             if not better.settled:

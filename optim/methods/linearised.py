@@ -295,6 +295,7 @@ class Local:
     feasible: Annotated[bool, "Whether the limits are kept."]
     conditions: Annotated[Conditions, "Multipliers and residual."]
     standing: Annotated[tuple[float, float], "What designs are compared by; see `standing`."]
+    at_a_jump: Annotated[bool, "Whether what is minimised jumps there: nothing nearer is lower."] = False
 
     @property
     def rank(self) -> tuple[tuple[float, float], bool]:

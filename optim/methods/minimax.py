@@ -191,6 +191,7 @@ def minimax_search(
     model = replace(model, penalty=first)
     hessian, radius = np.zeros((n, n)), FIRST_RADIUS
     seen: deque[Model] = deque(maxlen=remembered)
+    jump = False
     for _ in range(MOST_STEPS):
         known = with_cuts(model, seen, CUTS_REACH * radius)
         step = solve_subproblem(known, _root(hessian), radius, ball=ball)
@@ -213,7 +214,8 @@ def minimax_search(
             hessian = _curvature(model, fresh, _pulls(known, step), hessian, accepted=ratio > ENOUGH)
             seen.append(model if ratio > ENOUGH else fresh)
         size = float(np.linalg.norm(step.step, 2 if ball else np.inf))
-        if decrease <= AT_A_JUMP * model.merit and _jumps(model, fresh, size):
+        jump = decrease <= AT_A_JUMP * model.merit and _jumps(model, fresh, size)
+        if jump:
             break
         if ratio > 0.75 and size > 0.9 * radius:
             radius = min(2.0 * radius, LARGEST_RADIUS)
@@ -223,13 +225,17 @@ def minimax_search(
             here, model = trial, fresh
             if model.merit <= enough:
                 break
-    return ended(here, replace(with_cuts(model, seen, SAME_DESIGN), penalty=PENALTY), variables)
+    end = ended(here, replace(with_cuts(model, seen, SAME_DESIGN), penalty=PENALTY), variables)
+    return replace(end, at_a_jump=jump)
 
 
 def _jumps(model: Model, fresh: Model, size: float) -> bool:
-    """Return whether what is minimised rises over a step by far more than the slopes at its ends tell."""
-    steepest = max(float(np.abs(one.slopes).sum(axis=1).max()) for one in (model, fresh))
-    return fresh.objective - model.objective > JUMP * steepest * size
+    """Return whether what is minimised rises over a step by far more than any row tells at either end."""
+    ahead, back = (
+        replace(one, heights=one.heights + sign * size * np.abs(one.slopes).sum(axis=1)).objective
+        for one, sign in ((model, JUMP), (fresh, -JUMP))
+    )
+    return ahead < fresh.objective and model.objective < back
 
 
 def _too_weak(model: Model, step: Step) -> bool:
@@ -248,7 +254,7 @@ def thorough_search(
     A row bent over a long step may pass for a new one and hold a search where nothing is.
     """
     found = minimax_search(evaluate, variables, begin, model_of, enough=enough, strict=strict)
-    if found.settled or found.merit <= enough:
+    if found.settled or found.at_a_jump or found.merit <= enough:
         return found
     again = minimax_search(
         evaluate, variables, found.evaluation, model_of, remembered=0, enough=enough, strict=strict

@@ -28,7 +28,8 @@ from random_designs import (
 import optim
 import solver
 from optim.criteria.peak_criterion import PEAK
-from optim.methods.linearised import Taylor, corners, places, promising
+from optim.methods.linearised import Model, Taylor, corners, places, promising
+from optim.methods.minimax import _jumps
 from optim.problem.design_problem import Method, Problem
 from optim.results.design_result import Certainty, DesignResult, DesignStatus
 from optim.robust.robust_result import RobustResult, RobustStatus
@@ -320,3 +321,21 @@ def test_promising_places_are_where_slopes_leave_room() -> None:
     assert not promising(models[:1], inside, 0.9, 0.02, 3)
     high = promising(models, inside, 3.5, 0.02, 3, above=True)
     assert all(not 0.3 <= place[0] <= 0.5 for place in high)
+
+
+def at(z: float, heights: list[float], slopes: list[float]) -> Model:
+    """A design of one variable whose rows are these."""
+    none = np.zeros(0)
+    return Model(
+        z=np.array([z]), rows=(), heights=np.array(heights), slopes=np.array(slopes)[:, None],
+        groups=np.zeros(len(heights)), limited=(), excess=none, excess_slopes=np.zeros((0, 1)),
+        by_z=np.ones(1), bends=np.zeros(1), unit=1.0, units=none,
+    )  # fmt: skip
+
+
+def test_a_jump_is_a_rise_that_no_row_tells_of() -> None:
+    """A low row may be as steep as it likes; one that passes the highest makes a kink."""
+    here = at(0.5, [1.0, 0.5], [-0.1, 50.0])
+    assert _jumps(here, at(0.501, [1.001, 0.55], [-0.1, 50.0]), 1e-3)
+    assert not _jumps(here, at(0.501, [0.9999, 0.55], [-0.1, 50.0]), 1e-3)
+    assert not _jumps(at(0.5, [1.0, 0.99], [-1.0, 20.0]), at(0.501, [0.999, 1.01], [-1.0, 20.0]), 1e-3)

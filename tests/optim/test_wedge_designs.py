@@ -1,6 +1,8 @@
 """Designs of the platform wedge against points that are solved one by one, without a sweep."""
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,9 +11,11 @@ from scipy.optimize import minimize_scalar
 import optim
 import solver
 from optim import DesignStatus
+from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.evaluation import evaluate
-from optim.problem.design_problem import pose
-from solver import Scene
+from optim.methods import enough_harmonics
+from optim.problem.design_problem import Problem, pose
+from solver import BranchStatus, Scene
 
 HARMONICS = 3
 BAND = (300.0, 420.0)  # Hz
@@ -154,6 +158,30 @@ def test_a_design_far_above_the_best_is_not_followed() -> None:
     known = evaluate(pose(scene), {"wedge.mass": 0.012}, gradients=False)
     assert evaluate(pose(scene), {"wedge.mass": 0.012}, gradients=False, most=1.01 * known.objective).good
     assert not evaluate(pose(scene), {"wedge.mass": 0.012}, gradients=False, most=0.9 * known.objective).good
+
+
+def test_a_branch_that_leaves_the_limit_at_once_has_few_points() -> None:
+    light = evaluate(pose(solver.load_scene("platform-wedge")), {"wedge.mass": 0.0004}, most=1.1e-3)
+    (response,) = light.responses
+    assert response.branch.status is BranchStatus.TOO_HIGH
+    assert len(response.branch.values) < 20
+
+
+def test_the_measure_is_asked_of_another_response_where_that_amid_the_range_is_lost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem = pose(solver.load_scene("platform-wedge"), variables={"wedge.mass": (0.001, 0.03)}, harmonics=3)
+    middle = problem.variables[0].outside(0.5)
+
+    def lost_amid(posed: Problem, values: Mapping[str, float], **more: Any) -> DesignEvaluation:
+        if values["wedge.mass"] == middle:
+            return DesignEvaluation(values=values, responses=(), rows=())
+        return evaluate(posed, values, **more)
+
+    monkeypatch.setattr(enough_harmonics, "evaluate", lost_amid)
+    measured, told = enough_harmonics.by_first_response(problem, None)
+    assert [one.good for one in told] == [False, True]
+    assert measured.cases[0].scene.observe.measure == "half_peak_to_peak"
 
 
 @pytest.mark.long

@@ -1,11 +1,16 @@
 """Wedges so light that some of their points slip and others stick: responses that fold where a point begins
 to slip, and branches that pass there."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import solver
-from solver import BranchStatus, start_of
+from solver import BranchStatus, ContinuationSettings, start_of
+from solver.balance.balance import build
+from solver.balance.workspace import PointSolution, Workspace
+from solver.continuation.stretches import ahead_of, control_of
 
 AXIAL = slice(1, None, 3)  # ports of the second tangential direction, along the wedge
 
@@ -107,3 +112,21 @@ def test_a_branch_is_given_up_where_it_is_far_higher_than_what_it_is_compared_wi
     assert branch.amplitude.max() > 1e-3
     whole = solver.sweep(shipped("wedge", 0.012), settings=settings)
     assert whole.reached
+
+
+def test_what_lies_behind_the_end_of_a_branch_is_solved_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    balance = build(wedge(12.0), harmonics=3)
+    workspace, inside = Workspace.of(balance), balance.parameter.inside
+    control = control_of(ContinuationSettings(), inside(300.0), inside(420.0), ContinuationSettings().pace)
+    here = workspace.solve(inside(419.0)).u
+    tried, solve = list[float](), Workspace.solve
+
+    def counted(self: Workspace, p: float, *more: Any, **ways: Any) -> PointSolution:
+        tried.append(p)
+        return solve(self, p, *more, **ways)
+
+    monkeypatch.setattr(Workspace, "solve", counted)
+    ahead = ahead_of(workspace, np.append(here, inside(419.0))[None, :], control)
+    assert ahead(1e-3) is ahead(1e-3)
+    assert tried == [inside(419.0) + 1e-3 * (inside(420.0) - inside(300.0))]
+    assert ahead(1e-2) is None
