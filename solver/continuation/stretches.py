@@ -47,6 +47,7 @@ from solver.scene.scene_harmonics import Amplitudes
 STIFFEST = 1e7
 NEIGHBOUR = 0.05  # largest change of the vibration, relative, over which a branch is taken up again
 MANY, NEAR, STILL = 24, 1e-7, 1e-3  # points within such shares of the range and of the motion lead nowhere
+AWAY = 0.03  # share of the motion that a closed curve is wide at least
 _MOVES = 1e-6  # share of the largest amplitude of a contact, of harmonics with which one moves
 AHEAD = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # of the range, where it is looked why a branch went no further
 
@@ -277,6 +278,28 @@ def taken_up(
         numbers[walk_states.STEPPED_OVER] += 1
         return again if code == walk_states.RUNNING else None
     return None
+
+
+def comes_back(stretches: Sequence[Stretch]) -> bool:
+    """Return whether a branch goes round a closed curve: its last points lie where it was before.
+
+    Half of them lie so near to the line between two points that were passed in the same direction, and the
+    branch was far away since; a wiggle about a corner does not count.
+    """
+    *ends, end = (one.solutions[-1, -1] for one in stretches if len(one.solutions))
+    if not ends or not min(ends) <= end <= max(ends):
+        return False
+    points = np.concatenate([one.solutions for one in stretches])
+    last, before, hits = points[-MANY:], points[:-MANY], 0
+    size = np.abs(last[:, :-1]).max(initial=0.0)
+    for point, step in zip(last[1:], np.diff(last[:, -1]), strict=True):
+        off = before[:, -1] - point[-1]
+        k = np.flatnonzero((off[:-1] * off[1:] < 0.0) & (np.diff(off) * step > 0.0))
+        share = (off[k] / (off[k] - off[k + 1]))[:, None]
+        between = (1.0 - share) * before[k, :-1] + share * before[k + 1, :-1]
+        near = k[np.abs(between - point[:-1]).max(axis=1, initial=0.0) <= STILL * size]
+        hits += bool(near.size) and bool(np.abs(before[near[0] :, :-1] - point[:-1]).max() > AWAY * size)
+    return hits >= MANY // 2
 
 
 def control_of(settings: ContinuationSettings, start: float, stop: float, pace: Pace) -> Control:

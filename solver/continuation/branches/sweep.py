@@ -40,6 +40,7 @@ from solver.continuation.stretches import (
     BranchStretches,
     Course,
     Stretch,
+    comes_back,
     control_of,
     ending,
     ends_undamped,
@@ -153,6 +154,9 @@ def _swept(
             break
         if stretch.status is not None:
             status = stretch.status
+            break
+        if comes_back(stretches):
+            status = BranchStatus.STALLED
             break
         if course.on_points is not None:
             values = balance.parameter.all_outside(stretch.solutions[:, -1].copy())

@@ -1,6 +1,7 @@
 """Wedges so light that some of their points slip and others stick: responses that fold where a point begins
 to slip, and branches that pass there."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import solver
 from solver import BranchStatus, ContinuationSettings, start_of
 from solver.balance.balance import build
 from solver.balance.workspace import PointSolution, Workspace
-from solver.continuation.stretches import ahead_of, control_of
+from solver.continuation.stretches import Stretch, ahead_of, comes_back, control_of, rows_of
 
 AXIAL = slice(1, None, 3)  # ports of the second tangential direction, along the wedge
 
@@ -130,3 +131,35 @@ def test_what_lies_behind_the_end_of_a_branch_is_solved_once(monkeypatch: pytest
     assert ahead(1e-3) is ahead(1e-3)
     assert tried == [inside(419.0) + 1e-3 * (inside(420.0) - inside(300.0))]
     assert ahead(1e-2) is None
+
+
+def closes(turns: float, drift: float = 0.0) -> bool:
+    """Whether a way to λ = 1 and round a circle there, in stretches of 16 points, is told to close."""
+    angle = 2.0 * np.pi * np.arange(round(80 * turns)) / 80.3
+    way = np.stack([np.full(30, 0.5), np.linspace(0.0, 0.97, 30)], axis=1)
+    circle = np.stack([1.0 - 0.5 * np.cos(angle) + drift * angle, 1.0 + 0.3 * np.sin(angle)], axis=1)
+    points, rows = np.concatenate([way, circle]), rows_of(build(wedge(12.0), harmonics=3), 0)
+    none = Stretch(
+        **rows, status=None, newton_iterations=0, rejected_steps=0, stepped_over=0, seconds=0.0,
+        walk=np.zeros(0),
+    )  # fmt: skip
+    stretches = [replace(none, solutions=points[i : i + 16]) for i in range(0, len(points), 16)]
+    return any(comes_back(stretches[: i + 1]) for i in range(len(stretches)))
+
+
+def test_a_branch_that_goes_round_a_closed_curve_is_told_from_one_that_goes_on() -> None:
+    assert closes(2.0)
+    assert not closes(0.95)
+    assert not closes(3.0, drift=0.05)
+
+
+@pytest.mark.long
+def test_a_cylinder_whose_branch_closes_ends_at_once() -> None:
+    """The 4000 points that a look may have were spent on the circle from 369.96 to 375.15 Hz."""
+    light = solver.load_scene("platform-cylinder").with_values({"cylinder.mass": 0.005215629842616768})
+    light = light.model_copy(
+        update={"observe": light.observe.model_copy(update={"measure": "half_peak_to_peak"})}
+    )
+    branch = solver.sweep(light, settings=ContinuationSettings(most_points=1200, peaks=False, errors=False))
+    assert not branch.reached
+    assert len(branch.values) < 600
