@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from optim.criteria.constraint_rows import CaseResponse, DesignEvaluation
 from optim.criteria.evaluation import effects_of, evaluate, ranges_of, rows_of
@@ -30,10 +29,6 @@ from solver.continuation.branch import Branch
 from solver.results.watch import OnProgress, ShouldStop
 from solver.studies.peaks.minimise_peak import least_peak
 from solver.studies.peaks.track_results import LeastPeak, TrackStatus
-
-if TYPE_CHECKING:
-    from optim.results.design_result import DesignResult
-
 
 MOST_CASES = 4
 _OPTIMAL = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND)

@@ -17,12 +17,7 @@ from solver.contacts.kernels.system import MODES, POLES
 from solver.jit import eigen
 from solver.jit.fourier import Complex, Real
 from solver.linear.model import HeldMatrices
-from solver.matrices.normal_modes import (
-    UndampedModes,
-    hermitian,
-    least_stiffness,
-    undamped_modes,
-)
+from solver.matrices.normal_modes import UndampedModes, hermitian, least_stiffness, undamped_modes
 
 CLASSICAL = 1e-11  # largest off-diagonal modal damping, relative to the diagonal, that counts as none
 ROUNDING = 4.0  # the same in units of what the modes lack in orthogonality

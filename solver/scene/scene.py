@@ -36,13 +36,7 @@ from solver.scene.bodies.body_validation import body_issues, cyclic_issues
 from solver.scene.bodies.kinematics import Form
 from solver.scene.bodies.shape_parts import own_parts, with_shapes
 from solver.scene.excitation import with_factor_files
-from solver.scene.linear_terms import (
-    Aerodynamics,
-    CouplingOfAnyKind,
-    Entry,
-    SpeedDependence,
-    at_speed,
-)
+from solver.scene.linear_terms import Aerodynamics, CouplingOfAnyKind, Entry, SpeedDependence, at_speed
 from solver.scene.materials import Material
 from solver.scene.scene_records import (
     KINDS,

@@ -8,14 +8,7 @@ from functools import reduce
 from operator import or_
 from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
-from pydantic import (
-    Discriminator,
-    Field,
-    GetCoreSchemaHandler,
-    Tag,
-    field_validator,
-    model_validator,
-)
+from pydantic import Discriminator, Field, GetCoreSchemaHandler, Tag, field_validator, model_validator
 from pydantic_core import CoreSchema, core_schema
 
 from solver.contacts.fields import (

@@ -16,13 +16,7 @@ from solver.lab import from_lab
 from solver.linear.assembly import linear_model
 from solver.linear.model import with_inertia
 from solver.response.solution import Solution, check_converged
-from solver.response.stability.monodromy import (
-    PERIOD,
-    LinearPart,
-    Monodromy,
-    PeriodElement,
-    monodromy,
-)
+from solver.response.stability.monodromy import PERIOD, LinearPart, Monodromy, PeriodElement, monodromy
 from solver.response.stability.multipliers import Stability, growth_of
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.cyclic.annulus import annulus
