@@ -51,6 +51,17 @@ def test_nothing_stands_in_two_pages() -> None:
     assert sorted(twice) == []
 
 
+def test_the_rows_of_a_table_have_its_columns() -> None:
+    """A bar within a cell is written with a backslash."""
+    wrong = []
+    for page in [ROOT / "README.md", *PAGES, *sorted((ROOT / "benchmarks").rglob("*.md"))]:
+        text = re.sub(r"^```.*?^```$", "", text_of(page), flags=re.MULTILINE | re.DOTALL)
+        for table in re.findall(r"(?:^\|.*\n)+", text, flags=re.MULTILINE):
+            bars = [len(re.findall(r"(?<!\\)\|", row)) for row in table.splitlines()]
+            wrong += [f"{page.name}: {table.splitlines()[0]}"] * (len(set(bars)) > 1)
+    assert wrong == []
+
+
 def test_a_release_is_told_in_a_minute() -> None:
     """Each is dated, newest first, and as long as somebody reads."""
     text = text_of(ROOT / "CHANGELOG.md")
