@@ -97,10 +97,10 @@ from .response.worst_wear import (
 from .results.base import Shown as Shown, progress_bar as progress_bar
 from .results.files import Dataset as Dataset, Variable as Variable
 from .results.told import Summary as Summary
-from .scene.templates import SceneBuilder as SceneBuilder
+from .scene.scene_builder import SceneBuilder as SceneBuilder
 from .scene.cyclic.annulus import Extent as Extent, annulus as annulus, sectors_needed as sectors_needed
 from .scene.scene import Scene as Scene, load_scene as load_scene, shipped_scenes as shipped_scenes
-from .scene.templates import new_scene as new_scene
+from stickslip.lab.templates.templates import new_scene as new_scene
 from .scene.tensor_springs import tensor_springs as tensor_springs
 from .sensitivity.gradient import Gradient as Gradient, Sensitivities as Sensitivities
 from .sensitivity.gradient import (

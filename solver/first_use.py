@@ -110,7 +110,8 @@ def _of_a_scene(value: object, package: str) -> object:
     code = inner.__code__
     if not code.co_argcount or code.co_varnames[0] != "scene":
         return value
-    stops = "should_stop" in code.co_varnames[code.co_argcount :][: code.co_kwonlyargcount]
+    names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
+    stops = "should_stop" in names[code.co_argcount :]
 
     @wraps(value)
     def asked(*args: object, **kwargs: object) -> object:
@@ -118,10 +119,17 @@ def _of_a_scene(value: object, package: str) -> object:
             args = (_scene_of(args[0]), *args[1:])
         elif "scene" in kwargs:
             kwargs["scene"] = _scene_of(kwargs["scene"])
-        if not stops or "should_stop" in kwargs:
-            return value(*args, **kwargs)
-        with import_module("solver.results.watch").stopped_by_interrupt() as should_stop:
-            return value(*args, should_stop=should_stop, **kwargs)
+        try:
+            if not stops or "should_stop" in kwargs:
+                return value(*args, **kwargs)
+            with import_module("solver.results.watch").stopped_by_interrupt() as should_stop:
+                return value(*args, should_stop=should_stop, **kwargs)
+        except TypeError as error:
+            wrong = next((key for key in kwargs if str(error).endswith(f"keyword argument {key!r}")), None)
+            if wrong is None:
+                raise
+            hint = import_module("solver.wording").nearest(wrong, names)
+            raise TypeError(f"{error}{hint}") from None
 
     asked.__module__ = package  # where it is found by its name, as pickle does
     return asked

@@ -10,15 +10,23 @@ from inspect import cleandoc, get_annotations
 from typing import TypeVar
 
 Documented = TypeVar("Documented")
-_DECIMAL_COMMA = re.compile(r"(?:^|=)\s*([+-]?\d+,\d+(?:[eE][+-]?\d+)?)\s*(?:[}#]|$)")
+_DECIMAL_COMMA = re.compile(r"(?:^|[=:])\s*\x22?([+-]?\d+,\d+(?:[eE][+-]?\d+)?)\s*(?:[}#\x22A-Za-zµ°%]|$)")
 _DESCRIBED = re.compile(r"""Annotated\[(.+?)(?:, Field\(.+\))?, ('(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*")\]""")
 
 
 def nearest(name: str, known: Sequence[str]) -> str:
     """A hint ``; did you mean `x`?``, or nothing when no known name is near (or there are too many)."""
-    few = len(known) <= 300 and len(name) <= 200
-    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5) if few else []
-    return f"; did you mean `{near[0]}`?" if near else ""
+    if not known or len(known) > 300 or len(name) > 200:
+        return ""
+    alike = difflib.SequenceMatcher(b=name.casefold())
+
+    def ratio(one: str) -> float:
+        alike.set_seq1(one.casefold())
+        return alike.ratio()
+
+    near = max(known, key=ratio)
+    alike_enough = 0.5 if len(name) in (2, 3) else 0.65
+    return f"; did you mean `{near}`?" if ratio(near) >= alike_enough else ""
 
 
 def comma_hint(text: str) -> str:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key
 from optim.criteria.key import number_or_table
+from solver.results import units
 
 if TYPE_CHECKING:
     from optim.problem.variables import Real
@@ -42,7 +43,7 @@ def damping_of(judged: Judged, amplitude: float, mode: int) -> ModeDamping:
     from solver.modes.at_amplitudes import damping_hessian, mode_at_amplitudes
 
     balance, paths = judged.branch.balance, judged.problem.paths if judged.gradients else ()
-    what, kept = f"of mode {mode} at {amplitude:g} √kg m", balance.n_harmonics
+    what, kept = f"of mode {mode} at {units.quantity(amplitude, '√kg m')}", balance.n_harmonics
     try:
         found = mode_at_amplitudes(balance.scene, np.array([amplitude]), paths, mode=mode, harmonics=kept)
     except SettingError:  # the scene has the mode: this design alone has no equilibrium to move about

@@ -14,6 +14,7 @@ from pydantic import Field
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key, Ranges
 from optim.criteria.key import BandsHz, PositiveNumber, RangeRpm, RangesRpm, SpeedRpm
 from optim.criteria.peak_criterion import maxima
+from solver.results import units
 
 if TYPE_CHECKING:
     from optim.problem.cases import LoadCase
@@ -45,7 +46,7 @@ def _rows(judged: Judged, criterion: Criterion, which: str = "") -> list[Criteri
         return []
     low, high = judged.hertz
     return maxima(
-        judged, criterion, f"{judged.measured} from {low:g} to {high:g} Hz{which}",
+        judged, criterion, f"{judged.measured} from {units.span(low, high, 'Hz')}{which}",
         bound=judged.limit(criterion).bound, weight=judged.weight(criterion) * judged.case.weight,
     )  # fmt: skip
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key, of_sector
 from optim.criteria.key import number_or_table
+from solver.results import units
 
 if TYPE_CHECKING:
     from optim.criteria.response_gradients import Sensitivity
@@ -46,7 +47,7 @@ def _rows(judged: Judged, criterion: Criterion, measured: str) -> list[Criterion
                 second = partial(_times, factor, sensitivity, worst, name, measure)
             rows.append(
                 judged.row(
-                    criterion, f"{criterion.name} of {name} at {worst.at:.6g} Hz", factor * worst.value,
+                    criterion, f"{criterion.name} of {name} at {units.hertz(worst.at)}", factor * worst.value,
                     slope, at_hz=worst.at, bound=bound, weight=weight, second=second,
                 )
             )  # fmt: skip

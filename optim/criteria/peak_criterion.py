@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from optim.criteria.criterion import Criterion, CriterionRow, Form, Judged, Key
 from optim.criteria.key import FrequencyHz, PositiveNumber
+from solver.results import units
 
 if TYPE_CHECKING:
     from optim.criteria.response_gradients import Sensitivity
@@ -33,7 +34,7 @@ def maxima(
     peaks, sensitivity = judged.branch.peaks, judged.sensitivity
     return [
         judged.row(
-            criterion, f"{what} at {peak.at:.6g} Hz", factor * peak.value,
+            criterion, f"{what} at {units.hertz(peak.at)}", factor * peak.value,
             None if sensitivity is None else factor * sensitivity.peak(peak),
             at_hz=peak.at, bound=bound, weight=weight, second=_peak_second(sensitivity, peak, factor),
         )
@@ -92,7 +93,7 @@ def _band_rows(judged: Judged) -> list[CriterionRow]:
         if judged.problem.limit is None:
             dlimit = HALF_POWER * sensitivity.peak(branch.peaks[0])
         slope = sensitivity.band(branch.band.edges, dlimit)
-    what = f"band above {branch.band.limit:.6g} m"
+    what = f"band above {units.quantity(branch.band.limit, 'm')}"
     return [
         judged.row(
             BAND, what, branch.band.width, slope, bound=judged.limit(BAND), second=_band_second(judged)

@@ -13,6 +13,7 @@ from pydantic import Field
 
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key
 from optim.criteria.key import Name
+from solver.results import units
 
 if TYPE_CHECKING:
     from solver.scene.scene import AnyContact, Scene
@@ -39,7 +40,7 @@ def _of(judged: Judged, contact: AnyContact) -> list[CriterionRow]:
     least = Measure.LEAST_LOAD
     return [
         judged.row(
-            SEPARATION, f"{what} at {worst.at:.6g} Hz", worst.value,
+            SEPARATION, f"{what} at {units.hertz(worst.at)}", worst.value,
             None
             if judged.wear is None
             else worst_slopes(judged.wear, worst, contact.name, least).gradient,

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key
 from optim.criteria.key import number_or_table
 from optim.criteria.peak_criterion import COMPETES, maxima
+from solver.results import units
 from solver.results.units import STRESS_UNITS
 
 if TYPE_CHECKING:
@@ -176,7 +177,7 @@ def _worst(
         slopes = WorstMeanSlopes(seen.branch.balance, seen.problem.paths, free)
         by_paths = peak_gradient(slopes, peak).gradient
     return seen.row(
-        UTILISATION, f"{what} at {peak.at:.6g} Hz, by the worst mean that stuck contacts may hold",
+        UTILISATION, f"{what} at {units.hertz(peak.at)}, by the worst mean that stuck contacts may hold",
         peak.value, by_paths, at_hz=peak.at, bound=bound, weight=weight,
     )  # fmt: skip
 

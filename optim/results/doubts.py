@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from solver.results import units
 from solver.results.known import Known, flag_words, notes_of_all
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def _few_harmonics(evaluation: DesignEvaluation, harmonics: int) -> list[str]:
 
 
 def _share(known: Known) -> str:
-    return f"{100.0 * known.relative:.2g} %" if math.isfinite(known.relative) else "not known"
+    return f"{units.number(100.0 * known.relative, 2)} %" if math.isfinite(known.relative) else "not known"
 
 
 def _checked(checked: Sequence[Checked], optimum: Mapping[str, float], *, feasible: bool) -> list[str]:
@@ -87,7 +88,7 @@ def _checked(checked: Sequence[Checked], optimum: Mapping[str, float], *, feasib
     if own is not None and not own.feasible and feasible:
         found.append(f"with {own.harmonics} harmonics this design does not keep the limits")
     if best is not own and best.feasible:
-        where = ", ".join(f"{name} = {value:.6g}" for name, value in best.values.items())
+        where = ", ".join(f"{name} = {units.number(value)}" for name, value in best.values.items())
         found.append(f"with {best.harmonics} harmonics another local optimum is better: {where}")
     return found
 

@@ -113,10 +113,15 @@ class Keys:
         flags = {word: one.flag for name, one in made.items() for word in (name, one.key)}
         return cls(study, made, {**flags, "path": flags.get("parameter", "--set")})
 
-    def read(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the keys that were given."""
+    def read(self, given: Mapping[str, Any], scene: Scene) -> dict[str, Any]:
+        """Return the keys that were given, numbers of parameters in the units of a scene."""
         read = {name: one.in_body(given[one.parameter.name]) for name, one in self.made.items()}
-        return {name: value for name, value in read.items() if value is not None}
+        with self.named():
+            return {
+                name: inputs.in_units(value, scene, (name,))
+                for name, value in read.items()
+                if value is not None
+            }
 
     @contextmanager
     def named(self) -> Iterator[None]:
@@ -137,6 +142,7 @@ class Keys:
             *(keyword(name, annotation) for name, annotation in before.items()),
             *(one.parameter for one in self.made.values()),
             keyword("values", options.Values, None),
+            keyword("without", options.Without, None),
             *(keyword(name, one, None) for name, one in {**behind, **drawn, "out": options.Out}.items()),
             keyword("as_json", options.Json, False),
         ]
@@ -160,12 +166,12 @@ def command_of(study: type[Study]) -> Callable[..., None]:
     keys = Keys.of(study)
 
     def compute(
-        name: str, values: list[str] | None, out: str | None, as_json: bool, plot: str | None = None,
-        **given: Any,
+        name: str, values: list[str] | None, without: list[str] | None, out: str | None, as_json: bool,
+        plot: str | None = None, **given: Any,
     ) -> None:  # fmt: skip
         outputs = Outputs.asked(plot, out)
-        scene = inputs.scene(name, values)
-        asked = keys.read(given)
+        scene = inputs.scene(name, values, without)
+        asked = keys.read(given, scene)
         prepare(lambda: cost(study.NAME, scene, asked))
         if wrong := study.model_construct(**asked).issues(scene):
             raise refused(wrong, keys.flags)

@@ -198,10 +198,20 @@ PROJECTS = (
 )
 
 COMMANDS = {
+    "Start here": (
+        CommandEntry(
+            "new", "stickslip.lab.templates.commands.new",
+            "Write a commented scene to begin with: a template, or a copy of a shipped scene.",
+        ),
+        CommandEntry("sweep", STUDY, "Follow the response over a parameter."),
+        CommandEntry("design", "commands.design_commands.design", "Find the best damper."),
+        CommandEntry(
+            "serve", "commands.service.serve", "Serve the page and the REST API, and work off its queue."
+        ),
+    ),
     "Compute": (
         CommandEntry("plan", STUDY, "Say which effects a scene calls for, and why."),
         CommandEntry("solve", STUDY, "Compute one periodic response, or look for all of them."),
-        CommandEntry("sweep", STUDY, "Follow the response over a parameter."),
         CommandEntry(
             "map", STUDY, "Map the response over frequency and a parameter, with the ridge of its peaks."
         ),
@@ -220,7 +230,6 @@ COMMANDS = {
         CommandEntry("peaks", STUDY, "Track the highest peak over a parameter."),
     ),
     "Design": (
-        CommandEntry("design", "commands.design_commands.design", "Find the best damper."),
         CommandEntry(
             "pareto", "commands.design_commands.pareto", "Find the front of peak against resonance band."
         ),
@@ -274,10 +283,11 @@ COMMANDS = {
             "check-proof", "stickslip.lab.proofs.commands.check_proof",
             "Check the proofs in a file that `solve`, `peaks`, `design` or `modes --certify --json` wrote.",
         ),
-        CommandEntry("demo", "commands.service.demo", "Run the main job end to end, with pictures."),
+        CommandEntry(
+            "demo", "stickslip.lab.demo.commands.demo", "Run the main job end to end, with pictures."
+        ),
     ),
     "Service": (
-        CommandEntry("serve", "commands.service.serve", "Serve the REST API and work off its queue."),
         CommandEntry("worker", "commands.service.worker", "Work off a queue without HTTP."),
         CommandEntry(
             "submit", "commands.client.submit.SubmitGroup", "Hand a job to a running service.", group=True

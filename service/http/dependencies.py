@@ -250,7 +250,10 @@ class TypedRoute(APIRoute):
                     errors = error.errors()[:MOST_TOLD]
                     found = [{**one, "loc": one["loc"][1:]} for one in errors]
                     known = [{**one, "loc": one["loc"][1:]} if of_kinds else one for one in found]
-                    raise InvalidRequestError(issues_of(known)) from error
+                    kinds: Any = (await context_of(request)).service.registry if of_kinds else {}
+                    kind = value.get("kind") if isinstance(value, dict) else None
+                    model = kinds[kind].request if isinstance(kind, str) and kind in kinds else None
+                    raise InvalidRequestError(issues_of(known, model)) from error
 
         return read_and_handle
 

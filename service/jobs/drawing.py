@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from service.jobs.kind_registry import Json, NothingToDrawError, ReadSweep, Registry, StoredCurve, StoredSweep
+from solver.results import units
 from solver.results.known import Measured
 from solver.views.plots.curves import Response, above, with_peak
 
@@ -74,7 +75,7 @@ def harmonics_of(result: Json) -> Figure:
     heights = np.array(result["harmonics"] or [], dtype=np.float64)
     if not np.isfinite(heights).any():
         raise NothingToDrawError("no response was found")
-    place = f" at {result['frequency_hz']:.6g} Hz" if "frequency_hz" in result else ""
+    place = f" at {units.hertz(result['frequency_hz'])}" if "frequency_hz" in result else ""
     return harmonics_figure(
         heights, f"{result.get('scene', 'last period')}{place}", dof=Measured.of_result(result).dof
     )  # fmt: skip

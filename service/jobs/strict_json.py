@@ -17,6 +17,7 @@ from pydantic import BaseModel, ValidationError
 
 from service.errors import BodyTooLargeError, InvalidRequestError, MalformedBodyError
 from solver.errors import UNSAID, Issue, Place, Shown, pointer
+from solver.wording import comma_hint, nearest
 
 _Way = Any  # None at the top, or a pair: the way to a container, and a key or an index in it
 
@@ -270,15 +271,17 @@ def validated(model: type[ModelT], body: object, source: str = "body") -> ModelT
     try:
         return model.model_validate(dict(body))
     except ValidationError as error:
-        raise InvalidRequestError(issues_of(error.errors(include_url=False)[:MOST_TOLD]), source) from error
+        found = error.errors(include_url=False)[:MOST_TOLD]
+        raise InvalidRequestError(issues_of(found, model), source) from error
 
 
-def issues_of(errors: Sequence[Any]) -> list[Issue]:
-    """Pydantic's errors as issues."""
-    return [_issue(error) for error in errors]
+def issues_of(errors: Sequence[Any], model: type[BaseModel] | None = None) -> list[Issue]:
+    """Pydantic's errors as issues; `model` says which keys the whole knows."""
+    fields = {} if model is None else model.model_fields
+    return [_issue(error, [field.alias or name for name, field in fields.items()]) for error in errors]
 
 
-def _issue(error: Mapping[str, Any]) -> Issue:
+def _issue(error: Mapping[str, Any], keys: Sequence[str]) -> Issue:
     location = tuple(part for part in error["loc"] if part != "[key]")
     kind = error["type"]
     if kind in ("union_tag_not_found", "union_tag_invalid"):
@@ -290,10 +293,17 @@ def _issue(error: Mapping[str, Any]) -> Issue:
     else:
         _, _, should = str(error["msg"]).partition(" should ")
         wanted = _MESSAGES.get(kind) or (f"must {should}" if should else str(error["msg"]))
+    hint = ""
+    if kind == "extra_forbidden" and len(location) == 1:
+        wanted += nearest(str(location[0]), keys)
+    elif kind == "literal_error" and isinstance(error["input"], str):
+        hint = nearest(error["input"], re.findall(r"'([^']+)'", error["ctx"]["expected"]))
+    elif kind == "float_type" and isinstance(error["input"], str):
+        hint = comma_hint(error["input"])
     # The validator of several keys says itself which it means.
     named = not wanted.startswith("`")
     told = named and kind not in ("missing", "extra_forbidden")
-    return Issue(location, wanted, Shown(_short(error.get("input"))) if told else UNSAID, named)
+    return Issue(location, wanted, Shown(_short(error.get("input")) + hint) if told else UNSAID, named)
 
 
 def _unknown_tag(error: Mapping[str, Any], location: Place) -> Issue:
@@ -303,7 +313,9 @@ def _unknown_tag(error: Mapping[str, Any], location: Place) -> Issue:
     if error["type"] == "union_tag_not_found":
         return Issue((*location, key), "is missing")
     known = str(context["expected_tags"]).replace("'", "")
-    return Issue((*location, key), f"must be one of {known}", Shown(_short(error["input"][key])))
+    got = error["input"][key]
+    hint = nearest(got, known.split(", ")) if isinstance(got, str) else ""
+    return Issue((*location, key), f"must be one of {known}", Shown(_short(got) + hint))
 
 
 def _short(value: object) -> str:

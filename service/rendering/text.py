@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
+from solver.results import units
 from solver.results.told import Block, ResultTable, Summary
 
 if TYPE_CHECKING:
@@ -109,7 +110,7 @@ def _shown(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, str) or not isinstance(value, Sequence):
-        return f"{value:.6g}" if isinstance(value, float) else str(value)
+        return units.number(value) if isinstance(value, float) else str(value)
     few = len(value) <= _LISTED and not any(isinstance(one, Mapping | list) for one in value)
     return ", ".join(map(_shown, value)) if few else f"{len(value)} values"
 

@@ -22,6 +22,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from service import errors
 from service.jobs.strict_json import issues_of
 from solver.errors import Issue
+from solver.wording import nearest
 
 log = logging.getLogger("stickslip.http")
 
@@ -186,7 +187,9 @@ async def _http_error(request: Request, error: Exception) -> JSONResponse:
     detail = str(error.detail)
     headers = dict(error.headers or {})
     if error.status_code == HTTPStatus.NOT_FOUND:
-        detail = f"there is nothing at {request.url.path}"
+        detail = (
+            f"there is nothing at {request.url.path}{nearest(request.url.path, [*request.app.state.own])}"
+        )
     elif error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
         headers["Allow"] = ", ".join(_allowed(request))
         detail = f"{request.method} is not possible at {request.url.path}, use {headers['Allow']}"

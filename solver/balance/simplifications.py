@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 from solver.errors import SettingError
+from solver.wording import nearest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,5 +62,6 @@ class Effects:
         chosen = [name.strip() for name in text.split(",")]
         for name in chosen:
             if name not in known:
-                raise SettingError("effects", name, f"must be `auto`, `all`, or of {', '.join(known)}")
+                words = f"must be `auto`, `all`, or of {', '.join(known)}"
+                raise SettingError("effects", name, words, nearest(name, known))
         return cls(**{name.replace("-", "_"): True for name in chosen})

@@ -16,6 +16,7 @@ from solver.errors import FieldError
 from solver.matrices.load_set import MatrixSet
 from solver.matrices.sectors.elimination import Elimination
 from solver.matrices.values import ASYMMETRY, one_triangle
+from solver.results import units
 
 _RIGID = 1e-3  # a frequency below this share of the next one counts as zero
 _BODY = 6
@@ -177,20 +178,20 @@ def notes(found: MatrixSet, omega2: Real) -> list[str]:
     )
     if first and not _SLOW <= first <= _FAST:
         said.append(
-            f"the first elastic frequency is {first:.3g} Hz: are M and K in units that go together? K in "
-            "N/mm goes with M in t, `units` mm, K in N/m with M in kg; N/mm with kg is a factor 32 too "
+            f"the first elastic frequency is {units.hertz(first)}: are M and K in units that go together? K "
+            "in N/mm goes with M in t, `units` mm, K in N/m with M in kg; N/mm with kg is a factor 32 too "
             "low, N/m with t a factor 32 too high. Or are M and K swapped?"
         )
     mass = total_mass(found)
     if mass is not None and 0.0 < mass[1] < _LIGHT:
         said.append(
-            f"the mass is {mass[1]:.3g} kg in {mass[0]}: if that is in tonnes (a model in mm, t, N, s), its "
-            "`units` are mm"
+            f"the mass is {units.quantity(mass[1], 'kg')} in {mass[0]}: if that is in tonnes (a model in mm, "
+            "t, N, s), its `units` are mm"
         )
     if mass is not None and mass[1] > _HEAVY:
         said.append(
-            f"the mass is {mass[1]:.3g} kg in {mass[0]}: is M in kg, and not the stiffness? Files are "
-            "taken in the order M K C unless their names say otherwise"
+            f"the mass is {units.quantity(mass[1], 'kg')} in {mass[0]}: is M in kg, and not the stiffness? "
+            "Files are taken in the order M K C unless their names say otherwise"
         )
     return said
 

@@ -44,7 +44,6 @@ _DRIVEN = 1e-9  # share of the largest static response from which a mode is driv
 
 BAND_END = "band_end"
 _SAME = 1e-9  # relative distance from an end within which a frequency is that end
-_DIGITS = 6
 
 
 def plausibility(scene: Scene) -> tuple[Note, ...]:
@@ -93,9 +92,11 @@ def _far(scene: Scene, found: Resonances) -> Iterator[Note]:
     away = np.maximum(low / every, every / high)
     at, times = float(every[away.argmin()]), float(away.min())
     if times > FAR:
-        side = f"above its end, {high:g} Hz" if at > high else f"below its beginning, {low:g} Hz"
+        side = (
+            f"above its end, {units.hertz(high)}" if at > high else f"below its beginning, {units.hertz(low)}"
+        )
         words = (
-            f"the natural frequency nearest to the band is {units.number(at)} Hz, a factor of "
+            f"the natural frequency nearest to the band is {units.hertz(at)}, a factor of "
             f"{units.number(times, 3)} {side}: are masses in kg, stiffnesses in N/m and the band in Hz?"
         )
         yield Note(name="far_from_band", words=words, numbers={"natural_hz": at, "times": times})
@@ -157,7 +158,7 @@ class _Structure(NamedTuple):
         i = int(near[moved[near].argmax()])
         shape = self.phi[:, i]
         ratio = float((shape.conj() @ self.C @ shape).real) / (2.0 * float(self.omega[i]))
-        mode = f"the observed mode at {units.number(float(hertz[i]))} Hz"
+        mode = f"the observed mode at {units.hertz(float(hertz[i]))}"
         numbers = {"natural_hz": float(hertz[i]), "damping_ratio": ratio}
         if ratio > OVERDAMPED:
             words = f"{mode} has a damping ratio of {units.number(ratio, 3)}: are dashpots in N s/m?"
@@ -239,7 +240,7 @@ def band_end_at(scene: Scene, at_hz: float, band: tuple[float, float]) -> tuple[
             if outside.size:
                 numbers[name] = nearest(outside, low, high)
     words = (
-        f"the highest amplitude is at an end of the band, {units.number(at_hz, _DIGITS)} Hz, and no maximum"
+        f"the highest amplitude is at an end of the band, {units.hertz(at_hz)}, and no maximum"
         f"{_outside(numbers) if found is not None else ''}"
     )
     return (Note(name=BAND_END, words=words, numbers=numbers),)
@@ -257,12 +258,12 @@ def _at_end(at_hz: float, band: tuple[float, float]) -> bool:
 def _outside(numbers: dict[str, float]) -> str:
     """Where the nearest linear resonances are."""
     told = [
-        f"{units.number(numbers[name], _DIGITS)} Hz with all contacts {words}"
+        f"{units.hertz(numbers[name])} with all contacts {words}"
         for name, words in (("open_hz", "open"), ("stuck_hz", "stuck"))
         if name in numbers
     ]
     if not told:
         return "; no linear resonance lies outside it"
     if numbers.get("open_hz") == numbers.get("stuck_hz"):
-        told = [f"{units.number(numbers['open_hz'], _DIGITS)} Hz"]
+        told = [units.hertz(numbers["open_hz"])]
     return f"; the nearest linear resonance outside it is {' or '.join(told)}"

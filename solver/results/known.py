@@ -60,11 +60,11 @@ class Measured(Piece):
         plain = self.measure == MAX_ABS and self.harmonic is None
         return [] if plain else [("amplitudes", self.name)]
 
-    def unit_for(self, largest: float) -> units.LengthUnit:
+    def unit_for(self, largest: float) -> units.ShownUnit:
         """The unit in which `largest` is drawn."""
-        return units.length_unit(largest) if self.unit == "m" else units.LengthUnit(self.unit, 1.0)
+        return units.shown_unit(largest, self.unit)
 
-    def label(self, what: str, unit: units.LengthUnit) -> str:
+    def label(self, what: str, unit: units.ShownUnit) -> str:
         """The name of an axis: `what` stands on it, such as ``amplitude``."""
         return f"{what}, {self.name} [{unit.name}]" if what else f"{self.name} [{unit.name}]"
 

@@ -11,6 +11,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from solver.results import units
+
 CONFIDENCE = 0.95
 
 
@@ -57,7 +59,7 @@ def quantile_json(name: str, value: float, values: Sequence[float], share: float
 
 
 def quantile_words(
-    found: Mapping[str, Any], key: str, samples: str, show: Callable[[float], str] = "{:.4g}".format
+    found: Mapping[str, Any], key: str, samples: str, show: Callable[[float], str] = units.number
 ) -> str:
     """Return a quantile with the ends between which it lies; that so few samples do not tell it.
 

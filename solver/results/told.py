@@ -18,6 +18,7 @@ from importlib import import_module
 from types import NoneType, UnionType
 from typing import Annotated, Any, ClassVar, Self, TypeVar, Union, get_args, get_origin
 
+from solver.results import units
 from solver.wording import fields_said, with_attributes
 
 _MOST = 30
@@ -246,7 +247,7 @@ def _words(value: Any, unit: str) -> str:
     if isinstance(value, Told):
         return repr(value)
     if isinstance(value, float):
-        return f"{value:.6g} {unit}".rstrip()
+        return units.quantity(value, unit)
     if hasattr(value, "shape"):
         import numpy as np
 

@@ -20,6 +20,8 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import ParamSpec, TypeVar
 
+from solver.results import units
+
 OnProgress = Callable[[float, int], None] | None
 ShouldStop = Callable[[], bool] | None
 
@@ -98,9 +100,9 @@ class Bar:
         self._last = now
         share = min(max(share, 0.0), 1.0)
         done, elapsed = round(share * WIDTH), now - self._begun
-        left = f", {elapsed * (1.0 / share - 1.0):.0f} s left" if share > 0.02 else ""
+        left = f", {units.quantity(elapsed * (1.0 / share - 1.0), 's')} left" if share > 0.02 else ""
         bar = f"{'█' * done}{'·' * (WIDTH - done)}"
-        line = f"{self._label} |{bar}| {100.0 * share:3.0f} %, {count}, {elapsed:.0f} s{left}"
+        line = f"{self._label} |{bar}| {100.0 * share:3.0f} %, {count}, {units.quantity(elapsed, 's')}{left}"
         self._write(f"\r{line.ljust(self._length)}")
         self._length = len(line)
 

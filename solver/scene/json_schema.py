@@ -68,7 +68,7 @@ def scene_schema() -> dict[str, Any]:
     number = {"type": "number", "exclusiveMinimum": 0.0, "description": "Mass [kg]."}
     for name in ("LumpedStructure", "CyclicStructure"):
         masses = definitions[name]["properties"]["masses"]
-        entry = {"anyOf": [number, {"$ref": "#/$defs/_MassEntry"}]}
+        entry = {"anyOf": [number, {"$ref": "#/$defs/MassEntry"}]}
         masses["patternProperties"] = dict.fromkeys(masses["patternProperties"], entry)
         masses["additionalProperties"] = False
     for definition in definitions.values():

@@ -6,15 +6,17 @@ asks of a path is asked of that object.
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Iterable, Mapping
+from fnmatch import fnmatchcase
 from numbers import Real
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from solver.contacts.fields import LARGEST
 from solver.contacts.laws.contact_law import AnyContact
 from solver.errors import SettingError
-from solver.results.units import number
+from solver.results.units import has_suffix, quantity, read
 from solver.scene.bodies import shape_parts as of_bodies
 from solver.scene.bodies.shape_parts import own_parts, shape_parameter, shape_paths
 from solver.scene.excitation import AMPLITUDE as AMPLITUDE
@@ -23,7 +25,7 @@ from solver.scene.excitation import excitation_parameter
 from solver.scene.linear_terms import at_speed
 from solver.scene.scene_parameter import ActsOn, SceneParameter, Slope, changed
 from solver.scene.scene_records import Damper, Mass, MatricesStructure, Spring, Structure
-from solver.wording import listing, nearest
+from solver.wording import comma_hint, listing, nearest
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -293,15 +295,55 @@ def with_values(scene: _SceneT, values: Mapping[str, float]) -> _SceneT:
     if len(values) > 1:
         _check_together(scene, values)
     for path, new in values.items():
+        given = new
         try:
-            number = float(new)
+            if isinstance(new, str) and has_suffix(new):
+                given = read(new, parameter_of(scene, path).unit)
+            number = float(given)
         except (TypeError, ValueError, OverflowError) as error:
-            raise SettingError(str(path), new, "must be a number") from error
+            words = str(error) if isinstance(new, str) and has_suffix(new) else "must be a number"
+            raise SettingError(str(path), new, words, comma_hint(str(new))) from error
         rigid = path.endswith((".kt", ".kn")) and number == math.inf
-        if isinstance(new, str | bool) or not (rigid or math.isfinite(number)):
+        if isinstance(given, str | bool) or not (rigid or math.isfinite(number)):
             raise SettingError(str(path), new, "must be a finite number")
         scene = _with_value(scene, path, number)
     return scene
+
+
+def without(scene: _SceneT, names: Iterable[str]) -> _SceneT:
+    """The scene without contacts and dampers of some names, and without bodies that nothing else holds."""
+    raw: dict[str, Any] = scene.to_dict()
+    gone, bodies = set[str](), {body.name for body in scene.bodies}
+    for name in names:
+        rows = [*raw["contacts"], *raw.get("dampers", ())]
+        found = {
+            row["name"]
+            for row in rows
+            for said in (row["name"], row.get("group"))
+            if said and fnmatchcase(said, name)
+        }
+        if not found:
+            known = dict.fromkeys(said for row in rows for said in (row["name"], row.get("group")) if said)
+            raise SettingError("without", name, f"must be of {listing([*known])}", nearest(name, [*known]))
+        gone |= found
+    contacts = tuple(contact for contact in scene.contacts if contact.name not in gone)
+    followed = tuple(one for one in scene.with_speed if one.path.rpartition(".")[0] not in gone)
+    if not bodies:
+        return scene.model_copy(update={"contacts": contacts, "with_speed": followed})
+    for key in ("contacts", "dampers"):
+        raw[key] = [row for row in raw.get(key, ()) if row["name"] not in gone]
+    kept = json.dumps([raw["contacts"], raw["dampers"]])
+    free = {body for body in bodies - gone if f'"{body}' not in kept} | gone & bodies
+
+    def stays(row: Any) -> bool:
+        ends = [*row.get("between", ()), row.get("name"), row.get("on"), row.get("path")]
+        return not any(str(end).partition(".")[0] in free for end in ends)
+
+    for table in (raw, raw["structure"]):
+        for key in ("bodies", "loads", "couplings", "springs", "dampers", "with_speed"):
+            if key in table:
+                table[key] = [row for row in table[key] if stays(row)]
+    return cast(_SceneT, type(scene).from_dict(raw))
 
 
 def _check_together(scene: Scene, values: Mapping[str, float]) -> None:
@@ -371,4 +413,4 @@ def parameter_unit(path: str) -> str:
 
 def parameter(path: str, value: float) -> str:
     """A value of a parameter path with its unit."""
-    return f"{number(value, digits=6)} {parameter_unit(path)}".rstrip()
+    return quantity(value, parameter_unit(path))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any
 
 from pydantic import (
@@ -25,6 +25,7 @@ from solver.contacts.laws.gap import GapSpring
 from solver.contacts.laws.polynomial import PolynomialSpring
 from solver.errors import Issue, SceneError, SettingError
 from solver.extensions import on_change
+from solver.results import units
 from solver.results.known import Measured
 from solver.results.told import Summary, html_of
 from solver.results.units import number
@@ -54,7 +55,7 @@ from solver.scene.scene_records import (
     Structure,
 )
 from solver.scene.toml import load_raw, scene_folder, shipped_scenes
-from solver.scene.validation import cross_issues, field_issues, plain, term_issues
+from solver.scene.validation import cross_issues, field_issues, in_si, plain, term_issues
 
 __all__ = [
     "KINDS",
@@ -174,7 +175,7 @@ class Scene(Part):
         low, high = self.observe.band
         return (
             f"<Scene {self.name}: {self.structure.kind}, {len(self.dofs)} DOFs, contacts {names}, "
-            f"{self.observe.dof} observed from {low:g} to {high:g} Hz>"
+            f"{self.observe.dof} observed from {units.span(low, high, 'Hz')}>"
         )
 
     __str__ = __repr__
@@ -214,8 +215,9 @@ class Scene(Part):
         raw = data if checked else plain(data)
         if not isinstance(raw, dict):
             raise SceneError.of((), f"a scene must be a table, got {type(raw).__name__}", named=False)
+        raw = raw if checked else in_si(raw, raw)
         try:
-            scene, issues = handler(data), []
+            scene, issues = handler(raw), []
         except ValidationError as error:
             scene, issues = None, field_issues(error, raw)
         if not checked:
@@ -373,6 +375,18 @@ class Scene(Part):
             The path is unknown or the value is out of its range.
         """
         return scene_paths.with_values(self, values)
+
+    def without(self, names: Iterable[str]) -> Scene:
+        """The scene without some contacts, their free limit: names, groups, dampers or patterns, ``patch-*``.
+
+        With a damper goes its body, with the last contact of a body the body, and what is fixed to it.
+
+        Raises
+        ------
+        SettingError
+            No contact has such a name.
+        """
+        return scene_paths.without(self, names)
 
     def at_frequency(self, frequency_hz: float) -> Scene:
         """The scene at a frequency [Hz] of its engine-order line; itself where it is on none."""

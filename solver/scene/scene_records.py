@@ -74,7 +74,7 @@ class Damper(Element, _Grouped):
     c: NonNegative
 
 
-class _MassEntry(_Grouped):
+class MassEntry(_Grouped):
     """A mass as a scene file gives it: a number, or a table with `m`, `name`, `group` and `factor`."""
 
     m: Positive
@@ -90,7 +90,7 @@ class _MassTable:
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        table = handler.generate_schema(Annotated[dict[MemberName, _MassEntry], Field(min_length=1)])
+        table = handler.generate_schema(Annotated[dict[MemberName, MassEntry], Field(min_length=1)])
         masses = core_schema.no_info_after_validator_function(cls._read, table)
         write = core_schema.plain_serializer_function_ser_schema(cls._write)
         return core_schema.no_info_before_validator_function(cls._as_table, masses, serialization=write)
@@ -101,7 +101,7 @@ class _MassTable:
         return cls._write(cast(tuple[Mass, ...], data)) if ready else data
 
     @staticmethod
-    def _read(table: dict[str, _MassEntry]) -> tuple[Mass, ...]:
+    def _read(table: dict[str, MassEntry]) -> tuple[Mass, ...]:
         return tuple(Mass.model_construct(dof=dof, **entry.__dict__) for dof, entry in table.items())
 
     @staticmethod

@@ -7,6 +7,7 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -39,7 +40,16 @@ def read_toml(text: str) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         at = _LINE.search(str(error))
         line = text.splitlines()[int(at[1]) - 1 : int(at[1])] if at else text.splitlines()[-1:]
-        raise TomlError(f"{error}{comma_hint(line[0] if line else '')}") from error
+        raise TomlError(f"{error}{_hint(line[0] if line else '')}") from error
+
+
+def _hint(line: str) -> str:
+    """What to write in place of what stands in a line that is no TOML."""
+    if any(quote in line for quote in "“”„‘’"):
+        return '; plain quotes, "…", around texts'
+    if "\\" in line and '"' in line:
+        return "; paths with / , or in '…', where a backslash stands for itself"
+    return comma_hint(line)
 
 
 @cache
@@ -47,6 +57,11 @@ def shipped_scenes() -> tuple[str, ...]:
     """Names of the scenes that come with the package, sorted."""
     folder = resources.files("solver.scene") / "shipped"
     return tuple(sorted(f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml")))
+
+
+def shipped_text(name: str) -> str:
+    """The file of a shipped scene."""
+    return (resources.files("solver.scene") / "shipped" / f"{name}.toml").read_text(encoding="utf-8")
 
 
 def scene_folder(name_or_path: object) -> Path:
@@ -65,47 +80,83 @@ def load_raw(name_or_path: object) -> dict[str, object]:
         No such scene, or a file that cannot be read as TOML or JSON (with the line).
     """
     if isinstance(name_or_path, str) and name_or_path in shipped_scenes():
-        text = (resources.files("solver.scene") / "shipped" / f"{name_or_path}.toml").read_text(
-            encoding="utf-8"
-        )
-        return _parse(text, name_or_path, ".toml")
+        return _parse(shipped_text(name_or_path), name_or_path, ".toml")
     if not isinstance(name_or_path, str | Path):
         raise _refusal(f"a scene must be a name or a path, got {name_or_path!r}")
-    path = Path(name_or_path)
+    path = Path(found_scene(name_or_path))
+    if path.suffix.lower() in _TAKEN_BY and path.is_file():
+        raise _refusal(f"{str(path)!r} is no scene (.toml, .json): {_TAKEN_BY[path.suffix.lower()]}")
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        data = path.read_bytes()
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise _refusal(f"{str(path)!r} is not UTF-8 text (byte {error.start}): not a scene file") from error
+        packed = next((words for head, words in _PACKED.items() if data.startswith(head)), "")
+        words = packed or f"not UTF-8 text (byte {error.start}): save it as UTF-8"
+        raise _refusal(f"{str(path)!r} is {words}") from error
     except (OSError, ValueError) as error:
-        name = str(name_or_path)
-        known = ", ".join(shipped_scenes())
-        near = difflib.get_close_matches(name, shipped_scenes(), n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise _refusal(
-            f"no scene {name!r}: neither a shipped scene ({known}) nor a readable file ({reason}){hint}"
-        ) from error
+        raise _refusal(f"no scene {str(name_or_path)!r}: {_nowhere(path, error)}") from error
     return _parse(text, str(path), path.suffix.lower())
+
+
+_IMPORT = "`stickslip import` makes one of matrices, modes or a mesh"
+_IDENTIFY = "measurements are for `stickslip identify SCENE DATA…`"
+_TAKEN_BY = {
+    **dict.fromkeys((".mtx", ".npz", ".mat", ".inp", ".bdf", ".dat", ".cdb", ".op4", ".pch", ".hb"), _IMPORT),
+    **dict.fromkeys((".csv", ".parquet", ".uff", ".unv", ".txt"), _IDENTIFY),
+}
+_PACKED = {
+    **dict.fromkeys((b"\xff\xfe", b"\xfe\xff"), "UTF-16 text: save it as UTF-8"),
+    b"\x1f\x8b": "packed by gzip: unpack it", b"PK": "a zip archive: unpack it",
+}  # fmt: skip
+
+
+def found_scene(name: str | Path) -> str | Path:
+    """The name of a shipped scene or a file as it is; of a file without its ending, the file."""
+    if not name or name in shipped_scenes() or Path(name).is_file():
+        return name
+    return next((f"{name}{end}" for end in (".toml", ".json") if Path(f"{name}{end}").is_file()), name)
+
+
+def _nowhere(path: Path, error: Exception) -> str:
+    """Why there is no scene at a path, with the name that was meant, if one is near."""
+    reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    hint = ""
+    with suppress(OSError, ValueError):
+        beside = sorted(str(one) for end in ("toml", "json") for one in path.parent.glob(f"*.{end}"))
+        if path.is_dir():
+            inside = sorted(str(one) for one in path.glob("*.toml"))
+            return f"it is a folder, a scene is a file{f' such as {inside[0]!r}' if inside else ''}"
+        near = difflib.get_close_matches(str(path), [*shipped_scenes(), *beside], n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+    return f"neither a shipped scene ({', '.join(shipped_scenes())}) nor a readable file ({reason}){hint}"
 
 
 def _parse(text: str, source: str, suffix: str) -> dict[str, object]:
     try:
         if suffix == ".toml":
-            return read_toml(text)
-        if suffix == ".json":
+            raw = read_toml(text)
+        elif suffix == ".json":
             raw = json.loads(text, object_pairs_hook=_without_duplicates)
         else:
             raise _refusal(f"{source!r} must end in .toml or .json, got {suffix!r}")
     except TomlError as error:
         raise _refusal(f"{source!r} is not valid TOML: {error}") from error
     except json.JSONDecodeError as error:
-        raise _refusal(f"{source!r} is not valid JSON: {error}") from error
+        line = text.splitlines()[error.lineno - 1] if text else ""
+        hint = "; double quotes around keys and texts" if "'" in line else comma_hint(line)
+        if not hint and text[: error.pos].rstrip().endswith(","):
+            hint = "; no comma behind the last entry"
+        raise _refusal(f"{source!r} is not valid JSON: {error}{hint}") from error
     except ValueError as error:
         raise _refusal(f"{source!r} holds a number that cannot be read: {error}") from error
     except RecursionError as error:
         raise _refusal(f"{source!r} is nested too deeply for a scene") from error
     if not isinstance(raw, dict):
         raise _refusal(f"{source!r} must hold one table, got {type(raw).__name__}")
+    if "structure" not in raw and "variables" in raw:
+        raise _refusal(f"{source!r} is a design problem, no scene: give it as `--problem {source}`")
+    if "structure" not in raw and {"kind", "status"} & raw.keys():
+        raise _refusal(f"{source!r} is a result, no scene: `stickslip check-proof` reads those with proofs")
     return raw
 
 

@@ -6,7 +6,9 @@ not hide a misspelt degree of freedom.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from itertools import chain, islice
 from typing import Any, cast
 
@@ -17,6 +19,8 @@ from solver.contacts.fields import GROUND, End, parse_end
 from solver.contacts.laws.law_registry import DEFAULT, laws
 from solver.contacts.laws.load_harmonics import LoadHarmonic
 from solver.errors import Issue, Place, Shown, pointer
+from solver.results.told import UNIT
+from solver.results.units import bound_said, doubt_said, has_suffix, read
 from solver.scene.bodies.body import Body, Load, Node, body_dofs
 from solver.scene.bodies.body_shapes import SHAPES, WITH_BODY
 from solver.scene.cyclic.sector_tables import is_cyclic
@@ -39,6 +43,7 @@ from solver.scene.scene_records import (
     Damper,
     Excitation,
     LumpedStructure,
+    MassEntry,
     MatricesStructure,
     Mistuning,
     Observe,
@@ -46,16 +51,17 @@ from solver.scene.scene_records import (
     Reduction,
     Spring,
 )
-from solver.wording import listing, nearest, quoted
+from solver.wording import comma_hint, every_field_said, listing, nearest, quoted
 
-TERM_KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
-    ("with_speed",): ("a dependence on the speed", tuple(SpeedDependence.model_fields)),
-    ("recovery",): ("a recovered quantity", tuple(Recovered.model_fields)),
-    ("materials",): ("a material", tuple(Material.model_fields)),
-    ("couplings",): ("a coupling", tuple(Coupling.model_fields)),
-    ("aerodynamics",): ("aerodynamics", tuple(Aerodynamics.model_fields)),
-    ("aerodynamics", "influence"): ("an influence", tuple(Influence.model_fields)),
-    ("aerodynamics", "nodal_diameters"): ("a nodal diameter", tuple(DiameterCoefficient.model_fields)),
+_Table = tuple[str, type[BaseModel]]
+_TERMS: dict[tuple[str, ...], _Table] = {
+    ("with_speed",): ("a dependence on the speed", SpeedDependence),
+    ("recovery",): ("a recovered quantity", Recovered),
+    ("materials",): ("a material", Material),
+    ("couplings",): ("a coupling", Coupling),
+    ("aerodynamics",): ("aerodynamics", Aerodynamics),
+    ("aerodynamics", "influence"): ("an influence", Influence),
+    ("aerodynamics", "nodal_diameters"): ("a nodal diameter", DiameterCoefficient),
 }
 
 MOST_ISSUES = 200  # of each kind: a scene with more is not read by a person
@@ -64,27 +70,23 @@ _SCENE_KEYS = (
     "name", "structure", "contacts", "excitation", "observe", "bodies", "nodes", "loads", "dampers", "speed",
     "couplings", "aerodynamics", "speed_order", "with_speed", "recovery", "materials",
 )  # fmt: skip
-_KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
-    (): ("a scene", _SCENE_KEYS),
-    ("structure", "lumped"): ("a lumped structure", tuple(LumpedStructure.model_fields)),
-    ("structure", "cyclic"): ("a cyclic structure", tuple(CyclicStructure.model_fields)),
-    ("structure", "matrices"): ("a matrices structure", tuple(MatricesStructure.model_fields)),
-    ("structure", "matrices", "reduction"): ("reduction", tuple(Reduction.model_fields)),
-    ("structure", "matrices", "cyclic"): ("structure.cyclic", tuple(CyclicBoundary.model_fields)),
-    ("structure", "masses"): ("a mass", ("m", "name", "group", "factor")),
-    ("structure", "springs"): ("a spring", tuple(Spring.model_fields)),
-    ("structure", "dampers"): ("a damper", tuple(Damper.model_fields)),
-    ("structure", "mistuning"): ("mistuning", tuple(Mistuning.model_fields)),
-    ("excitation",): ("an excitation", tuple(Excitation.model_fields)),
-    ("observe",): ("observe", tuple(Observe.model_fields)),
-    ("bodies",): ("a body", tuple(Body.model_fields)),
-    ("nodes",): ("a node", tuple(Node.model_fields)),
-    ("loads",): ("a load", tuple(Load.model_fields)),
-    **TERM_KEYS,
-    **{
-        ("dampers", shape): (f"a damper of the shape `{shape}`", tuple(each.model_fields))
-        for shape, each in SHAPES.items()
-    },
+_TABLES: dict[tuple[str, ...], _Table] = {
+    ("structure", "lumped"): ("a lumped structure", LumpedStructure),
+    ("structure", "cyclic"): ("a cyclic structure", CyclicStructure),
+    ("structure", "matrices"): ("a matrices structure", MatricesStructure),
+    ("structure", "matrices", "reduction"): ("reduction", Reduction),
+    ("structure", "matrices", "cyclic"): ("structure.cyclic", CyclicBoundary),
+    ("structure", "masses"): ("a mass", MassEntry),
+    ("structure", "springs"): ("a spring", Spring),
+    ("structure", "dampers"): ("a damper", Damper),
+    ("structure", "mistuning"): ("mistuning", Mistuning),
+    ("excitation",): ("an excitation", Excitation),
+    ("observe",): ("observe", Observe),
+    ("bodies",): ("a body", Body),
+    ("nodes",): ("a node", Node),
+    ("loads",): ("a load", Load),
+    **_TERMS,
+    **{("dampers", shape): (f"a damper of the shape `{shape}`", each) for shape, each in SHAPES.items()},
 }
 
 
@@ -93,24 +95,23 @@ def between_keys() -> tuple[str, ...]:
     return tuple(dict.fromkeys(key for law in laws().values() for key in law.END_KEYS))
 
 
-def _keys_of_kinds() -> dict[tuple[str, ...], tuple[str, tuple[str, ...]]]:
-    """Name and known keys of the contacts of each law, and of the couplings of each kind."""
-    found: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
-        ("couplings", kind): (f"a coupling of the kind `{kind}`", tuple(each.model_fields))
+def _tables_of_kinds() -> dict[tuple[str, ...], _Table]:
+    """The contacts of each law, and the couplings of each kind."""
+    found: dict[tuple[str, ...], _Table] = {
+        ("couplings", kind): (f"a coupling of the kind `{kind}`", each)
         for kind, each in coupling_kinds().items()
         if each is not Coupling
     }
     for law, each in laws().items():
-        keys = tuple(field.alias or key for key, field in each.model_fields.items())
-        answer = f"a contact with the law `{law}`", keys
+        answer = f"a contact with the law `{law}`", each
         if law == DEFAULT:
-            answer = found["contacts",] = "a contact", answer[1]
+            answer = found["contacts",] = "a contact", each
         found["contacts", LAW_TAG + law] = answer
-        found["contacts", LAW_TAG + law, "load"] = "a harmonic of a load", tuple(LoadHarmonic.model_fields)
+        found["contacts", LAW_TAG + law, "load"] = "a harmonic of a load", LoadHarmonic
     return found
 
 
-_BOUNDS = {"greater_than": (">", "gt"), "greater_than_equal": (">=", "ge"), "less_than_equal": ("<=", "le")}
+_BOUNDS = ("greater_than", "greater_than_equal", "less_than_equal", "less_than")
 _WANTED = {
     "float_type": "must be a number",
     "int_type": "must be a whole number",
@@ -121,21 +122,68 @@ _WANTED = {
     "tuple_type": "must be a list",
     "dict_type": "must be a table",
     "too_short": "must not be empty",
-    "too_long": "has too many entries",
     "model_type": "must be a table",
     "model_attributes_type": "must be a table",
 }
 
 
+_DEEPEST = 50  # a scene is five levels deep
+
+
 def plain(data: object, depth: int = 0) -> object:
-    """Models inside `data` replaced by the tables they stand for (a scene is five levels deep, not fifty)."""
+    """Models inside `data` replaced by the tables they stand for."""
     if isinstance(data, BaseModel):
         return data.model_dump(exclude_none=True)
-    if depth < 50 and isinstance(data, Mapping):
+    if depth < _DEEPEST and isinstance(data, Mapping):
         return {key: plain(value, depth + 1) for key, value in data.items()}
-    if depth < 50 and isinstance(data, list | tuple):
+    if depth < _DEEPEST and isinstance(data, list | tuple):
         return [plain(value, depth + 1) for value in data]
     return data
+
+
+_NUMERIC = re.compile(
+    r"\b(?:Positive|NonNegative|Signed|Friction|Angle|Inclination|Stiffness|float|Vector)\b"
+)
+
+
+def unit_of(place: Place, raw: Mapping[str, Any]) -> str | None:
+    """The unit of the number at a place of a scene, by its key: empty of a plain one, None of no number."""
+    keys = [step for step in place if isinstance(step, str)]
+    if keys[:2] == ["structure", "masses"] and len(keys) == 3:
+        return "kg"
+    if keys == ["excitation", "amplitude"]:
+        rows = [row for at, row in rows_of(dict(raw), "excitation") if at == place[: len(at)]]
+        return "m" if any(row.get("ground") or row.get("driven") for row in rows) else "N"
+    return _units_of_keys().get(keys[-1]) if keys else None
+
+
+def _units_of_keys() -> dict[str, str]:
+    """The unit of every key of a number, as its class says it; of one key it is the same everywhere."""
+    found = {"load": "N", "speed": "1/min", "speed_order": "", "k": "N/m", "c": "N s/m", "m": "kg"}
+    models = (model for _, model in (*_TABLES.values(), *_tables_of_kinds().values()))
+    for key, (kind, words) in chain.from_iterable(every_field_said(model).items() for model in models):
+        units = [unit for unit in UNIT.findall(words) if "," not in unit]
+        if _NUMERIC.search(kind) and not found.get(key):
+            found[key] = units[0] if units else ""
+    return found
+
+
+def in_si(raw: Any, whole: Mapping[str, Any], place: Place = ()) -> Any:
+    """A scene whose numbers may have a unit behind them, ``"35 deg"``, with those numbers as they are meant.
+
+    What cannot be read stays as it is.
+    """
+    if isinstance(raw, str):
+        unit = unit_of(place, whole) if has_suffix(raw) else None
+        with suppress(ValueError):
+            return raw if unit is None else read(raw, unit)
+    elif len(place) > _DEEPEST:
+        return raw
+    elif isinstance(raw, dict):
+        return {key: in_si(value, whole, (*place, key)) for key, value in raw.items()}
+    elif isinstance(raw, list) and any(isinstance(one, str | dict | list) for one in raw):
+        return [in_si(one, whole, (*place, i)) for i, one in enumerate(raw)]
+    return raw
 
 
 def field_issues(error: ValidationError, raw: dict[str, Any]) -> list[Issue]:
@@ -167,14 +215,28 @@ def _field_issue(found: ErrorDetails, raw: dict[str, Any]) -> Issue:
         return Issue((*steps, tag), f"must be one of {listing(tags)}", Shown(quoted(got) + hint))
     if kind == "value_error":
         return Issue(tuple(steps), str(context["error"]), named=False)
+    unit = unit_of(place, raw) or ""
     if kind in _BOUNDS:
-        sign, bound = _BOUNDS[kind]
-        wanted = f"must be {sign} {context[bound]:g}"
+        wanted = bound_said(found, unit)
         if isinstance(last, dict) and name in _table(found["loc"])[1]:
             # Another key gave the number, as the list of a load gives N0.
             return Issue(place, f"`{name}` {wanted}", Shown(quoted(found["input"])), named=False)
-        return Issue(place, wanted, Shown(quoted(last)))
-    return Issue(place, _WANTED.get(kind, found["msg"]), Shown(quoted(last)))
+        return Issue(place, wanted, Shown(quoted(last) + doubt_said(last, unit)))
+    wanted = _WANTED.get(kind, found["msg"])
+    if kind == "too_long":
+        wanted = f"must have {context['max_length']} entries at most"
+    if kind == "float_type" and isinstance(last, str):
+        wanted, hint = _no_number(last, unit)
+        return Issue(place, wanted, Shown(quoted(last) + hint))
+    return Issue(place, wanted, Shown(quoted(last)))
+
+
+def _no_number(text: str, unit: str) -> tuple[str, str]:
+    try:
+        read(text, unit)
+    except ValueError as error:
+        return str(error), comma_hint(text)
+    return "must be a number without quotes", ""
 
 
 def _walk(loc: Iterable[int | str], raw: object) -> tuple[list[int | str], object]:
@@ -190,12 +252,20 @@ def _walk(loc: Iterable[int | str], raw: object) -> tuple[list[int | str], objec
 
 def _table(loc: tuple[int | str, ...]) -> tuple[str, tuple[str, ...]]:
     """Name and known keys of the innermost table on the way to a location."""
+    title, model = table_of(loc)
+    if model is BaseModel:
+        return title, _SCENE_KEYS
+    return title, tuple(field.alias or key for key, field in model.model_fields.items())
+
+
+def table_of(loc: tuple[int | str, ...]) -> _Table:
+    """Name and class of the innermost table on the way to a location."""
     names = tuple(step for step in loc[:-1] if isinstance(step, str))
-    for known, answer in reversed([*_KEYS.items(), *_keys_of_kinds().items()]):
+    for known, (title, model) in reversed([*_TABLES.items(), *_tables_of_kinds().items()]):
         without_tag = tuple(name for name in names if name not in KINDS)
         if names[: len(known)] == known or (known and without_tag[: len(known)] == known):
-            return answer
-    return _KEYS[()]
+            return title, model
+    return "a scene", BaseModel
 
 
 def structure_of(raw: Mapping[str, Any]) -> dict[str, Any]:

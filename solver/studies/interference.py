@@ -24,6 +24,7 @@ from solver.jit.timer import clock
 from solver.linear.extra_terms import depends_on_speed
 from solver.linear.natural_frequencies import natural_frequencies
 from solver.modes.nonlinear_mode import at_nodal_diameter
+from solver.results import units
 from solver.results.watch import OnProgress, ShouldStop, shows_progress
 from solver.scene.scene import MatricesStructure, Scene
 from solver.studies.mistuning import without_mistuning
@@ -205,8 +206,8 @@ def _folded(
         most = math.floor(top / per_order)
         if most > MOST_ORDERS:
             wanted = (
-                f"must be at least {top * _REVOLUTIONS / MOST_ORDERS:.4g} 1/min: there {MOST_ORDERS} orders "
-                "reach the highest frequency, or `orders` or a lower `up_to_hz` be given"
+                f"must be at least {units.quantity(top * _REVOLUTIONS / MOST_ORDERS, '1/min')}: there "
+                f"{MOST_ORDERS} orders reach the highest frequency; or give `orders` or a lower `up_to_hz`"
             )
             raise SettingError("speed_rpm", speed, wanted)
         orders = tuple(range(1, most + 1))

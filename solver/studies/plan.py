@@ -19,6 +19,7 @@ from solver.linear.condensation import FEWEST_PORTS
 from solver.linear.kernels.receptance import PAIRS_UP_TO, receptance
 from solver.response.plausibility import plausibility
 from solver.response.stability.cost import forecast
+from solver.results import units
 from solver.scene.cyclic.annulus import sectors_needed
 from solver.scene.scene import (
     Scene,
@@ -226,7 +227,7 @@ def _reduction(scene: Scene) -> tuple[_Said, ...]:
         return ()
     reason = (
         f"{found.dofs} DOFs were reduced to the {len(structure.dofs)} in use and {found.modes} modes of the "
-        f"rest, the highest at {found.highest_hz:.5g} Hz: raise `keep_modes` until the answer stays"
+        f"rest, the highest at {units.hertz(found.highest_hz)}: raise `keep_modes` until the answer stays"
     )
     return (("reduction of the model", True, reason),)
 
@@ -268,12 +269,16 @@ def _slip(balance: Balance, i: int, stuck: Real) -> _Said:
         return f"law of {contact.name}", True, contact.evaluation
     limit = friction.limit(max(load.least, 0.0))
     carried = stuck[balance.system.first_port[i]]
-    words = f"stuck, {contact.name} would carry up to {carried:.4g} N in the band; its limit is {limit:.4g} N"
+    words = (
+        f"stuck, {contact.name} would carry up to {units.quantity(carried, 'N')} in the band; its limit is "
+    )
+    words += units.quantity(limit, "N")
     if carried <= limit:
         return (
             name,
             False,
-            f"{words}: while it sticks it is its spring of {friction.kt:g} N/m, checked at every step",
+            f"{words}: while it sticks it is its spring of {units.quantity(friction.kt, 'N/m')}, checked at "
+            "every step",
         )
     return name, True, words
 

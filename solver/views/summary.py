@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.continuation.branch import BranchStatus
-from solver.results import units
 from solver.results.known import Measured
 from solver.results.told import Summary
+from solver.results.units import duration, hertz, length, number, span
 
 if TYPE_CHECKING:
     from solver.modes.peaks.performance import PerformanceCurve
@@ -25,10 +25,10 @@ def of_performance(curve: PerformanceCurve) -> Iterator[Summary]:
     pairs: list[tuple[str, str]] = []
     load, peak = curve.least
     if math.isfinite(peak):
-        pairs.append(("least peak", f"{units.length(peak)} with {load:.4g} times the loads"))
+        pairs.append(("least peak", f"{length(peak)} with {number(load)} times the loads"))
     if curve.excitation.size:
         low, high = float(curve.excitation.min()), float(curve.excitation.max())
-        pairs.append(("excitation", f"from {low:.3g} to {high:.3g} times the scene's"))
+        pairs.append(("excitation", f"from {span(low, high, '')} times the scene's"))
     title = f"{curve.mode.scene.name}, mode {curve.mode.mode}"
     yield Summary(title, [*pairs, ("status", curve.mode.status.value)])
 
@@ -37,19 +37,19 @@ def of_least(best: LeastPeak) -> Iterator[Summary]:
     """The least highest peak, what holds it, and what else was met."""
     pairs: list[tuple[str, str]] = []
     if math.isfinite(best.at):
-        pairs.append(("least peak", f"{units.length(best.peak)} at {best.at:.6g}"))
-        pairs.append(("peaks there", ", ".join(f"{one.frequency:.6g} Hz" for one in best.active)))
+        pairs.append(("least peak", f"{length(best.peak)} at {number(best.at)}"))
+        pairs.append(("peaks there", ", ".join(hertz(one.frequency) for one in best.active)))
     if best.plateau is not None:
         low, high = best.plateau
-        pairs.append(("the same from", f"{low:.6g} to {high:.6g}, chosen by: {best.chosen_by}"))
+        pairs.append(("the same from", f"{span(low, high, '')}, chosen by: {best.chosen_by}"))
     # Of what is not proven a peak was followed to there, and a higher one may stand beside it.
     for proven, name, bound in ((True, "other minima", ""), (False, "perhaps other minima", "at least ")):
         others = [one for one in best.basins[1:] if one.proven is proven]
         if others:
-            told = [f"{bound}{units.length(one.peak)} at {one.at:.6g}" for one in others]
+            told = [f"{bound}{length(one.peak)} at {number(one.at)}" for one in others]
             pairs.append((name, "; ".join(told)))
-    pairs += [("responses", f"{best.sweeps}, the work of {best.work:.3g}")]
-    pairs.append(("time", units.duration(best.seconds)))
+    pairs += [("responses", f"{best.sweeps}, the work of {number(best.work, 3)}")]
+    pairs.append(("time", duration(best.seconds)))
     scene = "" if best.branch is None else f"of {best.branch.scene.name}"
     yield Summary(f"highest peak {scene}".rstrip(), pairs)
 
@@ -60,8 +60,8 @@ def of_blade_peaks(peaks: BladePeaks) -> Iterator[Summary]:
     pairs: list[tuple[str, str]] = []
     if known.size:
         at = int(np.nanargmax(peaks.value))
-        pairs.append(("highest", f"{units.length(known.max())} at {peaks.at_hz[at]:.6g} Hz, blade {at}"))
-        pairs.append(("lowest", units.length(known.min())))
+        pairs.append(("highest", f"{length(known.max())} at {hertz(peaks.at_hz[at])}, blade {at}"))
+        pairs.append(("lowest", length(known.min())))
     pairs.append(("blades", str(peaks.value.size)))
     reached = BranchStatus.COMPLETED
     ended = next((one for one in peaks.status if one is not reached), reached)
@@ -71,8 +71,8 @@ def of_blade_peaks(peaks: BladePeaks) -> Iterator[Summary]:
 def of_amplitudes(blades: BladeAmplitudes) -> Iterator[Summary]:
     """The blade that moves most, and the one that moves least."""
     pairs = (
-        ("largest", f"{units.length(blades.largest)}, blade {blades.worst}"),
-        ("smallest", units.length(float(blades.max_abs.min()))),
+        ("largest", f"{length(blades.largest)}, blade {blades.worst}"),
+        ("smallest", length(float(blades.max_abs.min()))),
         ("blades", str(blades.max_abs.size)),
     )
     yield Summary(Measured(dof=blades.dof).name, pairs)
@@ -82,8 +82,8 @@ def of_stability(found: Stability) -> Iterator[Summary]:
     """Whether it is stable, and the largest multiplier."""
     pairs: list[tuple[str, str]] = [
         ("stable", "yes" if found.stable else "no"),
-        ("largest multiplier", f"{found.radius:.6g} in modulus"),
+        ("largest multiplier", f"{number(found.radius)} in modulus"),
         ("multipliers", f"{found.multipliers.size}, and {found.neutral} that are 1 by construction"),
-        ("time", units.duration(found.seconds)),
+        ("time", duration(found.seconds)),
     ]
-    yield Summary(f"at {found.frequency_hz:.6g} Hz", [*pairs, ("status", found.growth.value)])
+    yield Summary(f"at {hertz(found.frequency_hz)}", [*pairs, ("status", found.growth.value)])

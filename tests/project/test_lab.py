@@ -15,11 +15,13 @@ PACKAGES = ("solver", "optim", "service", "migrations")
 GIVES = {
     "accuracy": ["study accuracy", "view accuracy"], "all_solutions": ["name solve_all"],
     "catalogue": ["name catalogue"], "controlled": ["study controlled"], "dask": [],
-    "exports": ["command export"], "ipopt": [], "limit_cycles": ["name limit_cycles"], "mcp": ["command mcp"],
-    "oidc": ["view oidc"], "posterior": ["study posterior", "command posterior"],
+    "demo": ["command demo"], "exports": ["command export"], "ipopt": [],
+    "limit_cycles": ["name limit_cycles"], "mcp": ["command mcp"], "oidc": ["view oidc"],
+    "posterior": ["study posterior", "command posterior"],
     "proofs": ["command check-proof", "name certify"], "quasi_periodic": ["study quasi-periodic"],
-    "stores": [], "traces": [], "wear_life": ["study wear", "name wear_life", "view wear_life"],
-    "widget": ["name explore"], "worst_mistuning": ["study worst-mistuning", "view worst_mistuning"],
+    "stores": [], "templates": ["command new", "name new_scene"], "traces": [],
+    "wear_life": ["study wear", "name wear_life", "view wear_life"], "widget": ["name explore"],
+    "worst_mistuning": ["study worst-mistuning", "view worst_mistuning"],
 }  # fmt: skip
 """What goes with each folder."""
 

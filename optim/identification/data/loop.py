@@ -21,6 +21,7 @@ from solver.balance.balance import build
 from solver.balance.simplifications import Effects
 from solver.jit import fourier
 from solver.jit.fourier import from_full, to_full
+from solver.results import units
 from solver.scene.scene import Scene
 from solver.sensitivity.observed import LoopSensitivities
 
@@ -151,7 +152,7 @@ def read_loop(scene: Scene, table: Table) -> MeasuredRows:
         wanted = (
             "must be a loop that dissipates, ∮ force d(motion) > 0: look at the signs of force and motion"
         )
-        raise table.refusal(f"{area:.4g} J", wanted)
+        raise table.refusal(units.quantity(area, "J"), wanted)
     sd = table.columns.get("loop_sd")
     return LoopRun(
         source=table.source, conditions=dict(table.conditions), contact=contact, frequency_hz=frequency,
@@ -169,8 +170,8 @@ def _phases(table: Table, frequency: float) -> Real:
     gaps = np.diff(np.sort(np.append(np.mod(tau, 2.0 * math.pi), 2.0 * math.pi)))
     if gaps.max() > 0.25 * math.pi:
         wanted = (
-            f"must be sampled over a whole period, 1/frequency = {1.0 / frequency:g} s, without gaps of an "
-            "eighth of it: give the `frequency` of the motion in the head"
+            f"must be sampled over a whole period, 1/frequency = {units.quantity(1.0 / frequency, 's')}, "
+            "without gaps of an eighth of it: give the `frequency` of the motion in the head"
         )
         raise table.refusal(float(time[-1] - time[0]), wanted, "time")
     return np.asarray(tau)

@@ -24,6 +24,7 @@ from solver.continuation.branches.point_by_point import is_unique
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.walk import ContinuationSettings
 from solver.jit.fourier import Complex
+from solver.results import units
 from solver.results.told import json_numbers
 from solver.scene.scene import Scene
 from solver.scene.scene_harmonics import even_harmonics_reason
@@ -262,7 +263,7 @@ def read_response(scene: Scene, table: Table) -> MeasuredRows:
     far = np.flatnonzero((frequencies < low / _FAR) | (frequencies > high * _FAR))
     if far.size:
         wanted = (
-            f"must be near the scene's band, {low:g} to {high:g} Hz: give the unit in the head of the "
+            f"must be near the scene's band, {units.span(low, high, 'Hz')}: give the unit in the head of the "
             "column, `frequency [kHz]`, `[rad/s]` or `[1/min]`"
         )
         raise table.error(int(far[0]), "frequency", wanted)

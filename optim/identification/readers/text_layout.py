@@ -223,7 +223,10 @@ def text_of(path: Path) -> str:
         It cannot be read.
     """
     try:
-        return decoded(path.read_bytes())
+        raw = path.read_bytes()
+        if raw.startswith(b"PK"):
+            raise DataError(str(path), "a zip archive", "must be text, of a table (.xlsx) its export as CSV")
+        return decoded(raw)
     except OSError as error:
         raise DataError(str(path), str(error), "must be a text file") from error
 

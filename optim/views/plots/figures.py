@@ -19,7 +19,7 @@ from optim.criteria.peak_criterion import PEAK
 from solver.jit.fourier import Real
 from solver.results import units
 from solver.results.known import Measured
-from solver.results.units import LengthUnit
+from solver.results.units import ShownUnit
 from solver.views.plots import style
 from solver.views.plots.curves import Response
 from solver.views.plots.responses import Demands, response_figure
@@ -69,15 +69,15 @@ def robust_figure(found: Json, *, ax: Into = None) -> Figure:
     for name, color in (("nominal", style.BLUE), ("robust", style.VERMILION)):
         if found[name] is not None:
             sides.append((f"{name} optimum", _Peaks.of(found[name]), color))
-    unit = units.length_unit(max((float(peaks.known.max(initial=0.0)) for _, peaks, _ in sides), default=1.0))
+    unit = units.shown_unit(max((float(peaks.known.max(initial=0.0)) for _, peaks, _ in sides), default=1.0))
     with style.styled():
         page, (axes,) = style.figure(6.0, 3.4, into=ax)
         for name, peaks, color in sides:
-            heights = peaks.known * unit.per_metre
+            heights = peaks.known * unit.per_one
             shares = 100.0 * (np.arange(heights.size) + 1.0) / max(heights.size, 1)
             axes.plot(shares, heights, color=color, marker="o", markersize=3.0, label=name)
             if math.isfinite(peaks.worst):
-                worst = peaks.worst * unit.per_metre
+                worst = peaks.worst * unit.per_one
                 axes.axhline(worst, color=color, linewidth=0.9, linestyle=(0, (5.0, 2.5)))
                 above = all(not other.worst > peaks.worst for _, other, _ in sides)
                 axes.annotate(
@@ -135,11 +135,11 @@ def sensitivities_figure(answer: Json, *, ax: Into = None) -> Figure:
         bands.set_yticklabels([])
         highest = answer["peaks"][0]
         peaks.set_title(
-            f"{answer['scene']}: peak of {units.length(highest['value'])} at {highest['at']:.4g} Hz"
+            f"{answer['scene']}: peak of {units.length(highest['value'])} at {units.hertz(highest['at'])}"
         )
         peaks.set_xlabel("change of the peak for 1 % more [%]")
         width = answer["band_hz"]
-        bands.set_title("no resonance band" if width is None else f"band of {width:.4g} Hz")
+        bands.set_title("no resonance band" if width is None else f"band of {units.hertz(width)}")
         bands.set_xlabel("change of the band for 1 % more [%]")
     return page
 
@@ -163,12 +163,12 @@ def pareto_figure(answer: Json, *, ax: Into = None) -> Figure:
         page, (front, risk) = style.figure(9.2, 3.7, columns=2, into=ax)
         points = answer["points"]
         band = np.array([point["band_hz"] for point in points])
-        peak = np.array([point["peak"] for point in points]) * unit.per_metre
+        peak = np.array([point["peak"] for point in points]) * unit.per_one
         wide, tall = float(np.ptp(band)) or 1.0, float(np.ptp(peak)) or 1.0
         for point, x, y in zip(points, band, peak, strict=True):
             if point["slope"] is None:
                 continue
-            slope = point["slope"] * unit.per_metre
+            slope = point["slope"] * unit.per_one
             reach = _TANGENT / np.hypot(1.0 / wide, slope / tall)
             front.plot(
                 [x - reach, x + reach], [y - slope * reach, y + slope * reach], color=style.SKY,
@@ -176,7 +176,7 @@ def pareto_figure(answer: Json, *, ax: Into = None) -> Figure:
             )  # fmt: skip
         front.plot(band, peak, color=style.BLUE, marker="o", markersize=4.5)
         for point in answer["dominated"]:
-            x, y = point["band_hz"], point["peak"] * unit.per_metre
+            x, y = point["band_hz"], point["peak"] * unit.per_one
             front.plot([x], [y], color=style.GREY, marker="x", markersize=4.5)
         knee = answer["knee"]
         if knee is not None:
@@ -184,7 +184,7 @@ def pareto_figure(answer: Json, *, ax: Into = None) -> Figure:
         front.margins(x=0.1, y=0.12)
         # The intervals of the band at the height of each point's peak, and where the peak is.
         for point in points:
-            y = point["peak"] * unit.per_metre
+            y = point["peak"] * unit.per_one
             for low, high in point["intervals"]:
                 risk.plot([low, high], [y, y], color=style.SKY, linewidth=3.2, solid_capstyle="butt")
             risk.plot([point["at"]], [y], color=style.BLUE, marker="o", markersize=4.0, linestyle="none")
@@ -198,13 +198,13 @@ def pareto_figure(answer: Json, *, ax: Into = None) -> Figure:
     return page
 
 
-def _name(axes: Axes, point: Json, unit: LengthUnit) -> None:
+def _name(axes: Axes, point: Json, unit: ShownUnit) -> None:
     """Mark the knee, with its design and its price."""
-    x, y = point["band_hz"], point["peak"] * unit.per_metre
+    x, y = point["band_hz"], point["peak"] * unit.per_one
     lines = [f"{path} {style.quantity(path, value, 4)}" for path, value in point["values"].items()][:_SHOWN]
     if point["hz_per_metre"] is not None:
         step = 10.0 ** math.floor(math.log10(_PRICED * point["peak"]))
-        lines.append(f"{units.length(step)} lower: {units.number(point['hz_per_metre'] * step, 3)} Hz wider")
+        lines.append(f"{units.length(step)} lower: {units.hertz(point['hz_per_metre'] * step)} wider")
     axes.plot([x], [y], color=style.VERMILION, marker="o", markersize=6.5, linestyle="none", zorder=5)
     axes.annotate(
         "knee: " + "\n".join(lines), (x, y), xytext=(10, 14), textcoords="offset points", va="bottom",
@@ -241,10 +241,10 @@ def identification_figure(answer: Json, *, ax: Into = None) -> Figure:
 def _draw_responses(axes: Axes, runs: Sequence[Json]) -> None:
     """Draw amplitudes over frequency."""
     top = max(float(np.max(run["data"])) for run in runs)
-    unit = units.length_unit(top)
+    unit = units.shown_unit(top)
     for run, colour in zip(runs, _shades(len(runs)), strict=True):
         order = np.argsort(run["x"])
-        _draw(axes, run, colour, unit.per_metre, order, markers="o")
+        _draw(axes, run, colour, unit.per_one, order, markers="o")
     axes.set_yscale("log")
     style.plain_log(axes.yaxis)
     dofs = dict.fromkeys(run["dof"] for run in runs)
@@ -254,9 +254,9 @@ def _draw_responses(axes: Axes, runs: Sequence[Json]) -> None:
 
 def _draw_loops(axes: Axes, runs: Sequence[Json]) -> None:
     """Draw force over motion."""
-    unit = units.length_unit(max(float(np.abs(run["x"]).max()) for run in runs))
+    unit = units.shown_unit(max(float(np.abs(run["x"]).max()) for run in runs))
     for run, colour in zip(runs, _shades(len(runs)), strict=True):
-        scaled = {**run, "x": (np.asarray(run["x"]) * unit.per_metre).tolist()}
+        scaled = {**run, "x": (np.asarray(run["x"]) * unit.per_one).tolist()}
         _draw(axes, scaled, colour, 1.0, np.arange(len(run["x"])), markers=".")
     style.label(axes, f"motion [{unit.name}]", "force [N]")
     _legend(axes, runs)
@@ -423,19 +423,19 @@ def _draw_order_responses(axes: Axes, answer: Json, shown: list[_Order]) -> None
     """The amplitude of every order, sideways."""
     curves = [one.curve for one in shown]
     top = max(float(curve.amplitude.max()) for curve in curves)
-    unit = units.length_unit(top)
+    unit = units.shown_unit(top)
     for one in shown:
         axes.plot(
-            one.curve.amplitude * unit.per_metre, one.curve.values, color=one.colour, linewidth=1.1,
+            one.curve.amplitude * unit.per_one, one.curve.values, color=one.colour, linewidth=1.1,
             label=f"order {one.number}",
         )  # fmt: skip
     if answer["limit"] is not None:
-        axes.axvline(answer["limit"] * unit.per_metre, color=style.INK, linewidth=0.9, linestyle=_DASHED)
+        axes.axvline(answer["limit"] * unit.per_one, color=style.INK, linewidth=0.9, linestyle=_DASHED)
     axes.set_xscale("log")
     least = min(float(curve.amplitude.min()) for curve in curves)
     if top > 0.0:
         least = max(least, _FAR_DOWN * top)
-        axes.set_xlim(least * unit.per_metre, 1.5 * top * unit.per_metre)
+        axes.set_xlim(least * unit.per_one, 1.5 * top * unit.per_one)
     style.plain_log(axes.xaxis)
     if least < _DECADES * top:
         axes.xaxis.set_major_locator(LogLocator())

@@ -10,6 +10,7 @@ from solver.results import units
 from solver.results.known import Measured, known_pairs, note_pairs, stable_pairs
 from solver.results.order_statistics import quantile_words
 from solver.results.told import Block, ResultTable, Summary
+from solver.results.units import duration, quantity
 from solver.scene.parameter_paths import parameter
 from solver.views.tables.responses import proved
 
@@ -50,7 +51,7 @@ def front(found: Json) -> Iterator[Block]:
 
     def wider(point: Json) -> str:
         per = point["hz_per_metre"]
-        return "" if per is None else f"{units.number(metres * per)} Hz"
+        return "" if per is None else units.hertz(metres * per)
 
     yield _designs(
         f"Front of {found['scene']}: peak against band",
@@ -58,15 +59,15 @@ def front(found: Json) -> Iterator[Block]:
         {
             "peak": lambda point: units.length(point["peak"]),
             "error": _error,
-            "band": lambda point: f"{units.number(point['band_hz'])} Hz",
-            f"peak for {hertz:g} Hz less band": less,
+            "band": lambda point: units.hertz(point["band_hz"]),
+            f"peak for {units.hertz(hertz)} less band": less,
             f"band for {units.length(metres)} less peak": wider,
             "": lambda point: "knee" if point is knee else "",
         },
     )
-    pairs = [("not found", f"band of {units.number(width)} Hz") for width in found["missed"]]
+    pairs = [("not found", f"band of {units.hertz(width)}") for width in found["missed"]]
     pairs += [("end", end["status"]) for end in found["ends"] if not end["reached"]]
-    effort = f"{found['evaluations']} designs in {units.duration(found['seconds'])}"
+    effort = f"{found['evaluations']} designs in {duration(found['seconds'])}"
     yield Summary("", [*Measured.of_result(found).pairs, *pairs, *known_pairs(found), ("effort", effort)])
 
 
@@ -108,7 +109,7 @@ def amount(value: float | None, unit: str) -> str:
     """A number of a row with its unit; lengths in the one that fits; of a row null has no end."""
     if value is None:
         return "infinite"
-    return units.length(value) if unit == "m" else f"{units.number(value)} {unit}"
+    return quantity(value, unit)
 
 
 def _pairs(found: Json) -> Pairs:
@@ -118,13 +119,14 @@ def _pairs(found: Json) -> Pairs:
     several = len({peak.get("case") for peak in peaks}) > 1
     if any(row["weight"] > 0.0 and row["quantity"] != "peak" for row in found.get("rows", ())):
         pairs.append(("objective", amount(found["objective"], "").strip()))
+    unit = Measured.of_result(found).unit
     for index, peak in enumerate(peaks):
         of = f" ({peak['case']})" if several else ""
-        name = "further peak" if index else "peak"
-        pairs.append((name, f"{units.length(peak['value'])} at {peak['at']:.6g} Hz{of}"))
+        name, error = ("further peak", None) if index else ("peak", found.get("error_estimate"))
+        pairs.append((name, f"{quantity(peak['value'], unit, error)} at {units.hertz(peak['at'])}{of}"))
     pairs += [*_errors(found), *_curve(found.get("curve"))]
     if found["band_hz"] is not None:
-        pairs.append(("band", f"{units.number(found['band_hz'])} Hz above {units.length(found['limit'])}"))
+        pairs.append(("band", f"{units.hertz(found['band_hz'])} above {quantity(found['limit'], unit)}"))
     for row in further(found):
         pairs.append((row["quantity"], f"{amount(row['value'], row['unit'])}: {row['what']}"))
     if found["active"]:
@@ -140,8 +142,8 @@ def _pairs(found: Json) -> Pairs:
     pairs += proved(found.get("certificates") or ())
     residual = found.get("optimality")
     if residual is not None:
-        pairs.append(("KKT residual", f"{residual:.1e}"))
-    effort = f"{found['evaluations']} frequency responses in {units.duration(found['seconds'])}"
+        pairs.append(("KKT residual", units.number(residual, 2)))
+    effort = f"{found['evaluations']} frequency responses in {duration(found['seconds'])}"
     work = found.get("work")
     if work is not None and abs(work - found["evaluations"]) >= 0.5:
         effort += f", the work of {units.number(work, 3)}"
@@ -159,15 +161,13 @@ def _curve(check: Json | None) -> Pairs:
 
     one = "one curve for all designs" if check["shared"] else f"{check['curves']} curves"
     told = "suffices" if check["suffices"] else "does not suffice"
-    spent = (
-        f"{units.duration(check['curve_seconds'])}, estimate {units.duration(check['correction_seconds'])}"
-    )
+    spent = f"{duration(check['curve_seconds'])}, estimate {duration(check['correction_seconds'])}"
     saved = check["seconds_saved"]
     return [
         ("performance curve", f"mode {check['mode']}, {one}: off by {percent('error')} here"),
         ("estimated before", f"{percent('estimate')}: {told} for {100.0 * check['tolerance']:g} %"),
-        ("time of curves", f"{spent}, a whole response {units.duration(check['response_seconds'])}"),
-        ("time saved", "none" if saved is None or saved <= 0.0 else units.duration(saved)),
+        ("time of curves", f"{spent}, a whole response {duration(check['response_seconds'])}"),
+        ("time saved", "none" if saved is None or saved <= 0.0 else duration(saved)),
     ]
 
 
@@ -197,12 +197,9 @@ def _plateau(found: Json) -> Pairs:
 
 
 def _errors(found: Json) -> Pairs:
-    """The estimated error of the peak that holds the design, and what makes numbers doubtful."""
-    error = found.get("error_estimate")
-    pairs = [] if error is None else [("estimated error", units.length(error))]
-    # The flags and open peaks are among the warnings.
-    pairs = [pair for pair in known_pairs(found, besides=("peaks_open",)) if pair[0] != "note"] or pairs
-    pairs += stable_pairs(found)
+    """What makes numbers doubtful; the error of the peak stands beside it."""
+    unknown = found.get("relative_error", 0.0) is None
+    pairs = [("estimated error", "not known"), *stable_pairs(found)] if unknown else stable_pairs(found)
     warnings = found.get("warnings", ())
     pairs += [("warning", words) for words in warnings]
     return pairs + [pair for pair in note_pairs(found) if pair[1] not in warnings]
@@ -334,20 +331,23 @@ def effort_pairs(found: Json) -> list[tuple[str, str]]:
     pairs: list[tuple[str, str]] = []
     if found["gain"] is not None:
         pairs.append(
-            ("gain", f"the robust worst peak is {100.0 * found['gain']:.3g} % below the nominal one")
+            (
+                "gain",
+                f"the robust worst peak is {units.number(100.0 * found['gain'], 3)} % below the nominal one",
+            )
         )
     if found["gap"] is not None:
         whole = ", after a look at the whole uncertainty" if found.get("inner_look") else ""
-        pairs.append(("gap of the cuts", f"{found['gap']:.1e}{whole}"))
+        pairs.append(("gap of the cuts", f"{units.number(found['gap'], 2)}{whole}"))
     if found["optimality"] is not None:
-        pairs.append(("KKT residual", f"{found['optimality']:.1e}"))
+        pairs.append(("KKT residual", units.number(found["optimality"], 2)))
     pairs += (known := known_pairs(found))
     said = {words for _, words in known}
     pairs += [("warning", words) for words in found.get("warnings", ()) if words not in said]
     if found["unknown"] is not None:
         pairs.append(("no response", found["unknown"]["words"]))
     effort = f"{found['designs']} designs, {found['responses']} frequency responses"
-    return [*pairs, ("effort", f"{effort} in {units.duration(found['seconds'])}")]
+    return [*pairs, ("effort", f"{effort} in {duration(found['seconds'])}")]
 
 
 def uncertain_rows(found: Json) -> list[tuple[str, str]]:
@@ -368,7 +368,7 @@ def uncertain_rows(found: Json) -> list[tuple[str, str]]:
         said.append(("mistuned disks", str(len(found["disks"]))))
     if "mistuning" in found:
         of, within = found["mistuning"]["of"], 100.0 * found["mistuning"]["within"]
-        said.append((f"{', '.join(of)} of every blade", f"within {within:.4g} % of the tuned one"))
+        said.append((f"{', '.join(of)} of every blade", f"within {units.number(within)} % of the tuned one"))
     return said
 
 

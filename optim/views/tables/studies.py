@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from solver.results import units
 from solver.results.known import Measured, known_pairs
 from solver.results.told import Block, ResultTable, Summary
+from solver.results.units import duration, hertz, length, number, quantity, span
 
 
 def campbell(found: Mapping[str, Any]) -> Iterator[Block]:
     """The crossings, and what every order does at running speeds."""
     low, high = found["speeds_rpm"][0]
-    title = f"{found['scene']}, {low:g} to {high:g} rpm, {found['n_harmonics']} harmonics"
+    title = f"{found['scene']}, {span(low, high, 'rpm')}, {found['n_harmonics']} harmonics"
     rows = [
         (
-            str(order["order"]), f"{crossing['speed_rpm']:.6g}", f"{crossing['frequency_hz']:.6g}",
+            str(order["order"]), number(crossing['speed_rpm']), number(crossing['frequency_hz']),
             _amplitude(crossing),
-            "running speed" if crossing["inside"] else f"{100.0 * crossing['margin']:.3g} % away",
+            "running speed" if crossing["inside"] else f"{number(100 * crossing['margin'], 3)} % away",
         )
         for order in found["orders"]
         for crossing in order["crossings"]
@@ -30,18 +30,18 @@ def campbell(found: Mapping[str, Any]) -> Iterator[Block]:
         highest = order["highest_running"]
         text = "no response at running speeds"
         if highest is not None:
-            text = f"at most {_amplitude(highest)}, at {highest['speed_rpm']:.6g} rpm"
-        over = ", ".join(f"{low:.6g} to {high:.6g}" for low, high in order["exceeded_running_rpm"])
+            text = f"at most {_amplitude(highest)}, at {quantity(highest['speed_rpm'], 'rpm')}"
+        over = ", ".join(span(low, high, "") for low, high in order["exceeded_running_rpm"])
         if over:
-            text += f"; above {units.length(order['limit'])} from {over} rpm"
+            text += f"; above {length(order['limit'])} from {over} rpm"
         pairs.append((f"order {order['order']}", text))
         for what, name in (("stuck_hz", "all stuck"), ("open_hz", "all open")):
-            pairs.append((f"  {name}", ", ".join(f"{value:.5g}" for value in order[what]) + " Hz"))
+            pairs.append((f"  {name}", ", ".join(number(value) for value in order[what]) + " Hz"))
     pairs += known_pairs(found) if "measure" in found else _open_ends(found["orders"])
     words = {True: "no", False: "yes", None: "unknown"}[found["clear"]]
-    what = "a peak" if found["limit"] is None else f"more than {units.length(found['limit'])}"
+    what = "a peak" if found["limit"] is None else f"more than {length(found['limit'])}"
     pairs.append((f"{what} at a running speed", words))
-    pairs.append(("time", units.duration(found["seconds"])))
+    pairs.append(("time", duration(found["seconds"])))
     yield Summary("", pairs)
 
 
@@ -56,17 +56,16 @@ def _amplitude(crossing: Mapping[str, Any]) -> str:
     """An amplitude with its estimated error; of an earlier version without."""
     error, height = crossing.get("error_estimate"), crossing["amplitude"]
     if error is None:
-        return units.length(height) + (" ± not known" if "error_estimate" in crossing else "")
-    unit = units.length_unit(height)
-    return f"{units.number(height * unit.per_metre)} ± {units.number(error * unit.per_metre, 2)} {unit.name}"
+        return length(height) + (" ± not known" if "error_estimate" in crossing else "")
+    return quantity(height, "m", error)
 
 
 def shares(found: Mapping[str, Any]) -> Iterator[Block]:
     """The peaks, and a row for every parameter."""
-    peaks = [f"{units.length(peak['value'])} at {peak['at']:.6g} Hz" for peak in found["peaks"]]
+    peaks = [f"{length(peak['value'])} at {hertz(peak['at'])}" for peak in found["peaks"]]
     title = f"{found['scene']}: {'; '.join(peaks) or 'no peak'}"
     if found["band_hz"] is not None:
-        title += f"; band {units.number(found['band_hz'])} Hz above {units.length(found['limit'])}"
+        title += f"; band {hertz(found['band_hz'])} above {length(found['limit'])}"
     many = len(peaks) > 1
     columns = (
         "parameter", "value",
@@ -75,7 +74,7 @@ def shares(found: Mapping[str, Any]) -> Iterator[Block]:
     rows = [
         (
             row["path"],
-            f"{units.number(row['value'], 6)} {row['unit']}".rstrip(),
+            f"{number(row['value'], 6)} {row['unit']}".rstrip(),
             *(_share(share) for share in row["peaks_percent"]),
             _share(row["band_percent"]),
         )
@@ -113,7 +112,7 @@ def identification(found: Mapping[str, Any]) -> Iterator[Block]:
         tried = f"none of the {len(known)} conditions tried lowers an error by 1 %"
         pairs.append(("measure next", f"{tried}: try others (--candidate), or another DOF"))
     pairs.append(("starts", f"{found['starts']}, of the best {found['agreeing']} ended at the same place"))
-    pairs.append(("time", units.duration(found["seconds"])))
+    pairs.append(("time", duration(found["seconds"])))
     yield Summary("", pairs)
 
 
@@ -121,9 +120,9 @@ def told_pairs(found: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Noise, what the data do not tell or hardly keep apart, what does not count, other optima."""
     pairs: list[tuple[str, str]] = []
     if found["noise"] is not None:
-        pairs.append(("noise", f"{100.0 * found['noise']:.3g} %"))
+        pairs.append(("noise", f"{number(100.0 * found['noise'], 3)} %"))
     if found["misfit"]:
-        chi2 = f" (reduced chi² {found['reduced_chi2']:.3g})" if found["reduced_chi2"] > 1.0 else ""
+        chi2 = f" (reduced chi² {number(found['reduced_chi2'], 3)})" if found["reduced_chi2"] > 1.0 else ""
         pairs.append(("warning", found["misfit"] + chi2))
     pairs += [("not told", one["words"]) for one in found["untold"]]
     for one in found["correlated"]:
@@ -131,8 +130,8 @@ def told_pairs(found: Mapping[str, Any]) -> list[tuple[str, str]]:
         pairs.append(("hardly apart", f"{names}, correlation {one['correlation']:+.3f}"))
     pairs += [("not reached", _lost(one)) for one in found["not_reached"]]
     for one in found["other_optima"]:
-        values = ", ".join(f"{name} = {value:.5g}" for name, value in one.items() if name != "misfit")
-        pairs.append(("another optimum", f"{values}; misfit {one['misfit']:.3g} times as large"))
+        values = ", ".join(f"{name} = {number(value)}" for name, value in one.items() if name != "misfit")
+        pairs.append(("another optimum", f"{values}; misfit {number(one['misfit'], 3)} times as large"))
     return pairs
 
 
@@ -140,19 +139,20 @@ def estimate_row(one: Mapping[str, Any]) -> tuple[str, ...]:
     """An unknown: estimate, error, interval, and whether it lies at a bound."""
     if not one["told"]:
         low, high = one["bounds"]
-        return one["name"], "not told", "", f"{low:.6g} to {high:.6g} {one['unit']}", "its bounds"
+        return one["name"], "not told", "", span(low, high, one["unit"]), "its bounds"
     low, high = one["interval"]
-    value = f"{one['value']:.6g} {one['unit']}".rstrip()
+    value = quantity(one["value"], one["unit"])
     words = "at a bound" if one["at_bound"] else ""
-    return one["name"], value, f"{one['standard_error']:.2g}", f"{low:.6g} to {high:.6g}", words
+    return one["name"], value, number(one["standard_error"], 2), span(low, high, ""), words
 
 
 def _lost(one: Mapping[str, Any]) -> str:
-    places = ", ".join(f"{at:.6g}" for at in one["at"])
+    places = ", ".join(number(at) for at in one["at"])
     return f"{one['run']}: no response found at {places} Hz; these points do not count"
 
 
 def candidate_words(one: Mapping[str, Any]) -> str:
     """Conditions of a measurement, and what it would tell."""
-    conditions = ", ".join(f"{path} = {value:.4g}" for path, value in one["conditions"].items())
-    return f"{conditions}: error of {one['tells']} times {one['factor']:.2g} (gain {one['gain']:.3g})"
+    conditions = ", ".join(f"{path} = {number(value)}" for path, value in one["conditions"].items())
+    factor, gain = number(one["factor"], 2), number(one["gain"], 3)
+    return f"{conditions}: error of {one['tells']} times {factor} (gain {gain})"

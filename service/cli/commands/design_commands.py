@@ -38,6 +38,7 @@ def command_of_problem(study: type[ProblemRequest]) -> Callable[..., None]:
     def command(
         flags: ProblemFlags,
         name: options.AnyScene = None,
+        without: options.Without = None,
         plot: options.Plot = None,
         out: options.Out = None,
         report: Report = None,
@@ -46,7 +47,7 @@ def command_of_problem(study: type[ProblemRequest]) -> Callable[..., None]:
         told = problem_inputs.description(name, flags, study.NAME)
         outputs = Outputs.asked(plot, out)
         page = inputs.output_path("--report", report, SUFFIXES)
-        scene, given = problem_inputs.posed(told, study)
+        scene, given = problem_inputs.posed(told, study, without)
         with told.named(), watched(study) as watch:
             answer = study.compute(scene, given, watch)
         if page is not None:
@@ -102,6 +103,7 @@ def _identify(
     data: list[str],
     column: list[str] | None,
     values: list[str] | None,
+    without: list[str] | None,
     plot: str | None,
     out: str | None,
     uncertain: str | None,
@@ -112,8 +114,8 @@ def _identify(
     outputs = Outputs.asked(plot, out)
     problem = inputs.output_path("--uncertain", uncertain, (".toml",))
     told = inputs.output_path("--report", report, SUFFIXES)
-    scene = inputs.scene(name, values)
-    asked = {"data": data, **_KEYS.read(given)}
+    scene = inputs.scene(name, values, without)
+    asked = {"data": data, **_KEYS.read(given, scene)}
     answer = computed(_KEYS, scene, asked, column)
     found: Any = answer.result
     if problem is not None and found.fitted:
@@ -150,9 +152,9 @@ identify = _KEYS.command(
 
 def write_problem(file: Path, name: str, values: dict[str, float], uncertain: Any) -> None:
     """Write the scene with values as a design problem with what is left uncertain."""
-    from solver.scene.toml import toml_text
+    from solver.scene.toml import found_scene, toml_text
 
-    there = Path(name)
+    there = Path(found_scene(name))
     scene = os.path.relpath(there.absolute(), file.absolute().parent) if there.is_file() else name
     head = (
         "Identified parameters, uncertain as the data leave them:",

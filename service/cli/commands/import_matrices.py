@@ -39,6 +39,7 @@ from service.cli.options.inputs import new_file, relative
 from service.cli.options.parameters import taking
 from service.errors import InputError
 from service.rendering.text import print_json, print_pairs
+from solver.results import units
 from solver.results.files import whole
 
 if TYPE_CHECKING:
@@ -180,7 +181,7 @@ def _made(
     given, remarks = raw.read.given or MatrixSet(matrices={}), []
     if written is not None:
         made = ", ".join(path.name for path in dict.fromkeys(found.roles.values()))
-        good = f"good to {written.good_to_hz:.5g} Hz (frequencies exact to 0.1 %)"
+        good = f"good to {units.hertz(written.good_to_hz)} (frequencies exact to 0.1 %)"
         remarks.append(f"Reduced from {given.size} rows of {made}; {good}.")
     with whole(raw.target) as temporary:
         temporary.write_text(toml(raw.table(between), remarks), encoding="utf-8")
@@ -267,13 +268,13 @@ def _report(
         return
     pairs = [
         ("DOFs in use", ", ".join(structure.dofs[:10]) + (", …" if len(structure.dofs) > 10 else "")),
-        ("first frequencies", ", ".join(f"{f:.5g} Hz" for f in frequencies[:6])),
+        ("first frequencies", ", ".join(units.hertz(f) for f in frequencies[:6])),
     ]
     if mass is not None:
-        pairs.append(("mass", f"{mass[1]:.4g} kg in {mass[0]}, without what is held"))
+        pairs.append(("mass", f"{units.quantity(mass[1], 'kg')} in {mass[0]}, without what is held"))
     if reduction is not None:
         kept = f"{reduction.dofs} DOFs to {len(structure.dofs)} and {reduction.modes} modes"
-        pairs.append(("reduced", f"{kept} up to {reduction.highest_hz:.5g} Hz"))
+        pairs.append(("reduced", f"{kept} up to {units.hertz(reduction.highest_hz)}"))
     if written is not None:
         pairs += written.pairs()
     pairs += [("note", note) for note in notes]

@@ -12,7 +12,9 @@ from service.cli import completion
 from service.cli.options import parameters as options
 from service.errors import InputError
 from service.rendering.text import print_json, print_table, say
+from solver.results import units
 from solver.scene.json_schema import DIALECT, plain, scene_schema
+from solver.wording import nearest
 
 
 class Described(Enum):
@@ -78,7 +80,7 @@ def scenes(as_json: options.Json = False) -> None:
             str(len(scene.dofs)),
             ", ".join(contact.name for contact in scene.contacts),
             scene.observe.dof,
-            f"{scene.observe.band[0]:g} to {scene.observe.band[1]:g} Hz",
+            f"{units.span(scene.observe.band[0], scene.observe.band[1], 'Hz')}",
         )
         for scene in known
     ]
@@ -98,5 +100,5 @@ def schema(
     """Print the JSON Schema of scene files, design problems or jobs, for editors."""
     words = [one.value for one in Described]
     if what not in words:
-        raise InputError(f"`schema` takes {', '.join(words)}, got {what!r}")
+        raise InputError(f"`schema` takes {', '.join(words)}, got {what!r}{nearest(what, words)}")
     say(json.dumps(schema_of(Described(what)), indent=2, ensure_ascii=False))

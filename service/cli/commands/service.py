@@ -1,4 +1,4 @@
-"""The commands that run the service or look after its database and keys: serve, worker, db, keys, demo."""
+"""The commands that run the service or look after its database and keys: serve, worker, db, keys."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def serve(
     database: options.Database = None,
     workers: options.Workers = None,
 ) -> None:
-    """Serve the REST API and work off its queue."""
+    """Serve the page and the REST API, and work off its queue."""
     processes.begin()
     from service.http.server import serve as run
 
@@ -62,27 +62,6 @@ def upgrade(database: options.Database = None) -> None:
 
     url = settings_of(database=database).database
     say(f"{shown(url)} is at revision {bring_up(url)}")
-
-
-def demo(
-    out: Annotated[
-        str, typer.Option("--out", metavar="DIR", help="Folder of the database and the pictures.")
-    ] = "demo-output",
-) -> None:
-    """Run the main job end to end, with pictures.
-
-    Designs the dampers of two-dof and bladed-disk on an embedded service and its database.
-    """
-    from service.cli.demo_cases import first_told
-
-    folder = Path(out)
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"`--out` must be a folder, got {out!r}")
-    told = first_told()
-    # Database, client and drawing are loaded after the first optimum, which needs none of them.
-    from service.cli.demo import run
-
-    run(folder, told=told)
 
 
 def settings_of(**values: object) -> Settings:

@@ -16,6 +16,7 @@ from service.cli.options.inputs import amount, count, new_file, relative, text
 from service.cli.options.parameters import Json
 from service.errors import InputError
 from service.rendering.text import print_pairs
+from solver.results import units
 from solver.results.files import whole
 
 if TYPE_CHECKING:
@@ -81,33 +82,33 @@ class ReducedModel:
         """What the reduction kept, for people."""
         quality, reduced, found = self.reduced.quality, self.reduced, self.motions
         begun = f"{self.given.counted} to {len(self.rows)} DOFs and {reduced.modes} modes"
-        end = f"in {self.seconds:.1f} s, written to {self.path}"
+        end = f"in {units.quantity(self.seconds, 's')}, written to {self.path}"
         if found is not None:
             free, stuck, off = found["free_hz"], found["stuck_hz"], found["error"]
             shares = [f"{100 * share:.1f} % in {way}" for way, share in found["mass_carried"].items()]
             return [
                 ("reduced", f"{begun}, and those to {found['count']} motions, {end}"),
-                ("motions", f"modes with the contacts free to {free:.5g} Hz and stuck to {stuck:.5g} Hz, "
-                            "static ones under forces and loads"),
+                ("motions", f"modes with the contacts free to {units.hertz(free)} and stuck to "
+                            f"{units.hertz(stuck)}, static ones under forces and loads"),
                 ("error", "no peak was found to tell it" if off is None else
-                          f"{off:.1e} of the peak's height, against all motions with one harmonic"),
+                          f"{units.number(off, 2)} of the peak, against all motions with one harmonic"),
                 ("mass carried", ", ".join(shares)),
             ]  # fmt: skip
-        held = ", ".join(f"{f:.5g}" for f in quality.held_hz[:6]) + (", …" if reduced.modes > 6 else "")
+        held = ", ".join(units.number(f) for f in quality.held_hz[:6]) + (", …" if reduced.modes > 6 else "")
         least = min(zip(quality.mass_carried, self.rows, strict=True), default=(0.0, ""))
         pairs = [
             ("reduced", f"{begun} {end}"),
-            ("modes kept", f"{held} Hz, the highest {reduced.highest_hz:.5g} Hz, with the DOFs held"
+            ("modes kept", f"{held} Hz, the highest {units.hertz(reduced.highest_hz)}, with the DOFs held"
                            if held else "none"),
-            ("good to", f"{quality.good_to_hz:.5g} Hz: frequencies up to there are estimated 0.1 % exact; "
-                        "harmonics that matter should lie below"),
+            ("good to", f"{units.hertz(quality.good_to_hz)}: frequencies up to there are estimated 0.1 % "
+                        "exact; harmonics that matter should lie below"),
             ("errors", "first frequencies too high by "
-                       + (", ".join(f"{e:.1e}" for e in quality.system_error[:6]) or "nothing")),
+                       + (", ".join(units.number(e, 2) for e in quality.system_error[:6]) or "nothing")),
             ("mass carried", f"{100 * least[0]:.1f} % of the inertia or more (least for {least[1]})"),
-            ("static check", f"residual {quality.static_residual:.1e}"),
+            ("static check", f"residual {units.number(quality.static_residual, 2)}"),
         ]  # fmt: skip
         if quality.shift_hz:
-            pairs.append(("free rest", f"not held by these DOFs; shifted by {quality.shift_hz:.3g} Hz"))
+            pairs.append(("free rest", f"not held by these DOFs; shifted by {units.hertz(quality.shift_hz)}"))
         return pairs
 
 
@@ -383,15 +384,16 @@ class WrittenSector:
         found = self.reduced
         told = [
             ("reduced", f"{self.full} rows to {len(self.rows)} DOFs and {found.modes} modes at each of "
-                        f"{len(found.quality)} nodal diameters in {self.seconds:.1f} s, in {self.path}"),
+                        f"{len(found.quality)} nodal diameters in {units.duration(self.seconds)}, in "
+                        f"{self.path}"),
             ("boundary", f"{self.pairs_of_rows} rows of the high boundary follow the low one"),
-            ("good to", f"{found.good_to_hz:.5g} Hz: frequencies up to there are estimated 0.1 % exact at "
-                        "every nodal diameter; harmonics that matter should lie below"),
+            ("good to", f"{units.hertz(found.good_to_hz)}: frequencies up to there are estimated 0.1 % exact "
+                        "at every nodal diameter; harmonics that matter should lie below"),
         ]  # fmt: skip
         for n, quality, seconds in zip(found.matrices.diameters, found.quality, found.seconds, strict=True):
-            first = ", ".join(f"{f:.6g}" for f in quality.system_hz[:4])
+            first = ", ".join(units.number(f) for f in quality.system_hz[:4])
             high = f"too high by {max(quality.system_error[:4].tolist(), default=0.0):.1e} of it at most"
-            told.append((f"diameter {n}", f"{first} Hz, …, {high}; {seconds:.1f} s"))
+            told.append((f"diameter {n}", f"{first} Hz, …, {high}; {units.quantity(seconds, 's')}"))
         return told
 
 

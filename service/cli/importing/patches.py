@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from service.cli.importing.import_files import split
 from service.errors import InputError
+from solver.results import units
 
 if TYPE_CHECKING:
     from solver.matrices.decks.deck import Deck
@@ -145,7 +146,9 @@ class Patches:
         size = math.sqrt(sum(value * value for value in vector))
         if given is None or len(vector) != 3 or not 0.0 < size < math.inf:
             fitted = (
-                "" if plane is None else "; the plane of its nodes has " + "/".join(f"{v:.4g}" for v in plane)
+                ""
+                if plane is None
+                else "; the plane of its nodes has " + "/".join(units.number(v) for v in plane)
             )
             got = "" if given is None else f", got {text!r}"
             raise InputError(

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
 from service.errors import InputError
-from solver.errors import SettingError
+from solver.errors import Place, SettingError
+from solver.results import units
+from solver.results.told import UNIT
 from solver.scene.descriptions import DISK_LOAD
 from solver.wording import comma_hint
 
@@ -21,12 +24,42 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
 
-def number(text: str) -> float:
+def number(text: str, unit: str = "") -> float:
     """A number, for an option (NaN is refused later, with the range that holds there)."""
     try:
-        return float(text)
-    except ValueError:
-        raise typer.BadParameter(f"must be a number, got {text!r}{comma_hint(text)}") from None
+        return units.read(str(text), unit)  # a default is one
+    except ValueError as error:
+        raise typer.BadParameter(f"{error}, got {text!r}{comma_hint(text)}") from None
+
+
+def unit_said(words: str) -> str | None:
+    """The unit that the words of an option say, ``[Hz]``."""
+    unit = UNIT.search(words)
+    return None if unit is None else unit[1]
+
+
+def number_in(words: str) -> Callable[[str], float]:
+    """Read a number in the unit that the words of an option say, or with another one behind it."""
+    unit = unit_said(words)
+    return number if unit is None else partial(number, unit=unit)
+
+
+def in_units(given: Any, scene: Scene, place: Place = ()) -> Any:
+    """What was given of parameter paths, its numbers with a unit behind them in those of the paths."""
+    if isinstance(given, Mapping):
+        return {key: in_units(value, scene, (*place, key)) for key, value in given.items()}
+    if isinstance(given, list):
+        return [in_units(value, scene, place) for value in given]
+    if not (isinstance(given, str) and units.has_suffix(given)):
+        return given
+    from solver.scene.parameter_paths import find_parameter
+
+    paths = (str(key).partition(",")[0] for key in reversed(place))
+    found = next(filter(None, (find_parameter(scene, path) for path in paths)), None)
+    try:
+        return given if found is None else units.read(given, found.unit)
+    except ValueError as error:
+        raise SettingError(place, given, str(error)) from error
 
 
 def whole_number(text: str) -> int:
@@ -39,7 +72,7 @@ def whole_number(text: str) -> int:
 
 def amount(flag: str, metavar: str, words: str) -> Any:
     """An option that takes a real number, with the words of its help."""
-    return typer.Option(flag, metavar=metavar, parser=number, help=words)
+    return typer.Option(flag, metavar=metavar, parser=number_in(words), help=words)
 
 
 def count(flag: str, metavar: str, words: str) -> Any:
@@ -65,12 +98,17 @@ def age(text: str) -> float:
     raise typer.BadParameter(f"must be a length of time such as 30d, 12h or 90min, got {text!r}")
 
 
+_ALIAS = "--unknown"  # of ``--variable`` in commands that look for values in data
+
+
 def join_words(arguments: Sequence[str]) -> list[str]:
     """Make one argument of the words that follow ``--variable PATH LO HI`` and the like.
 
     Repeatable options of several words each are what Typer does not have.
     """
     several = _several(arguments)
+    if _ALIAS in several:
+        arguments = ["--variable" if argument == _ALIAS else argument for argument in arguments]
     if not several.keys() & set(arguments):
         return list(arguments)
     joined: list[str] = []
@@ -96,7 +134,7 @@ def _several(arguments: Sequence[str]) -> dict[str, int]:
     """How many words follow an option of a command each time, where that is more than one."""
     named = [word for word in arguments[:2] if word != "submit"][:1]
     if named in (["identify"], ["posterior"]):
-        return {"--unknown": 3, "--prior": 3}
+        return {"--variable": 3, _ALIAS: 3, "--prior": 3}
     if not arguments or arguments[0] not in ("design", "pareto", "submit"):
         return {}
     from optim.problem.problem_keys import DesignKeys, FrontKeys, options
@@ -112,9 +150,9 @@ def _several(arguments: Sequence[str]) -> dict[str, int]:
     return {one.flag: one.several for one in options(model).values() if one.several > 1}
 
 
-def bounds(option: str, texts: Sequence[str], wanted: str = "LO HI") -> dict[str, list[float]]:
+def bounds(option: str, texts: Sequence[str], wanted: str = "LO HI") -> dict[str, list[Any]]:
     """Paths with two numbers each, such as the variables of a design with their bounds."""
-    variables: dict[str, list[float]] = {}
+    variables: dict[str, list[Any]] = {}
     for text in texts:
         words = text.split()
         if len(words) != 3:
@@ -142,26 +180,34 @@ def by_name(
     return found
 
 
-def numbers(option: str, words: Mapping[str, str]) -> dict[str, float]:
-    """The numbers of the words of `by_name`."""
-    return {name: part(option, f"{name}={word}", word) for name, word in words.items()}
+def numbers(option: str, words: Mapping[str, str], unit: str | None = None) -> dict[str, Any]:
+    """The numbers of the words of `by_name`; those with a unit are read where the scene is known."""
+    return {name: part(option, f"{name}={word}", word, unit) for name, word in words.items()}
 
 
-def settings(texts: Sequence[str] | None, option: str = "--set") -> dict[str, float]:
+def settings(texts: Sequence[str] | None, option: str = "--set") -> dict[str, Any]:
     """The values of ``--set``, in the given order."""
     return numbers(option, by_name(option, texts or (), f"{DISK_LOAD}=150"))
 
 
-def scene(name: str, texts: Sequence[str] | None) -> Scene:
-    """A shipped scene or a file, with the values of ``--set``."""
+def scene(name: str, texts: Sequence[str] | None, without: Sequence[str] | None = None) -> Scene:
+    """A shipped scene or a file, with the values of ``--set``, without the contacts of ``--without``."""
     import solver
 
     try:
-        return solver.load_scene(name).with_values(settings(texts))
+        return left_out(solver.load_scene(name).with_values(settings(texts)), without)
     except SettingError as error:
         if error.name == "path":
             raise InputError(error.issue.said("--set")) from error
         raise
+
+
+def left_out(found: Scene, without: Sequence[str] | None) -> Scene:
+    """The scene without the contacts of ``--without``."""
+    try:
+        return found.without(without) if without else found
+    except SettingError as error:
+        raise InputError(error.issue.said("--without")) from error
 
 
 def output_path(option: str, text: str | None, suffixes: Sequence[str] = ()) -> Path | None:
@@ -186,10 +232,10 @@ def new_file(option: str, text: str, suffixes: Sequence[str]) -> Path:
     return path
 
 
-def part(option: str, text: str, word: str) -> float:
-    """A number that is part of what was given to an option."""
+def part(option: str, text: str, word: str, unit: str | None = None) -> Any:
+    """A number that is part of what was given to an option; one with a unit as it is, where none is known."""
     try:
-        return float(word)
+        return word if unit is None and units.has_suffix(word) else units.read(word, unit or "")
     except ValueError:
         wanted = f"`{option}` needs a number where {word.strip()!r} stands, got {text!r}{comma_hint(word)}"
         raise InputError(wanted) from None

@@ -178,6 +178,7 @@ def _made(
         words = f"Switch off: {words}" if default is True else words
         return keyword(_KEY, Annotated[bool, typer.Option(flag, help=words)], False)
     type_, parser, shown = _read_as(schema)
+    parser = inputs.number_in(words) if parser is number else parser
     if said.metavar and kind == "object":  # told by the metavariable
         type_, parser = list[str], None
     if said.metavar == _PAIR:  # one of the ranges that a list may hold

@@ -45,6 +45,14 @@ Values = Annotated[
         autocompletion=completion.settings,
     ),
 ]  # fmt: skip
+Without = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--without", metavar="CONTACT",
+        help="Leave a contact out, the free limit: its name, a group, a damper or a pattern; repeatable.",
+        autocompletion=completion.contacts,
+    ),
+]  # fmt: skip
 Harmonics = Annotated[int, count("--harmonics", "H", "Highest harmonic kept.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 Plot = Annotated[

@@ -6,7 +6,7 @@ import functools
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,13 +19,13 @@ from service.cli import completion
 from service.cli.completion import SCENE_FILES
 from service.cli.failures import refused
 from service.cli.options import inputs, parameters
-from service.cli.options.inputs import number, whole_number
+from service.cli.options.inputs import whole_number
 from service.cli.options.parameters import Command, keyword, parameters_of, with_parameters
 from service.errors import InputError
 from service.jobs.common.scene_requests import UPLOAD, Place, named_files, with_named
 from solver.errors import Issue, SceneError, SettingError
 from solver.jit.compiler_process import cost, prepare
-from solver.scene.toml import TomlError, read_toml
+from solver.scene.toml import TomlError, found_scene, read_toml
 
 if TYPE_CHECKING:
     from service.client.client import Client
@@ -67,7 +67,7 @@ _OFFERED: dict[Form, Callable[..., list[str]]] = {
     Form.WORDS_BY_PATH: completion.settings, Form.NAMES: completion.contacts,
 }  # fmt: skip
 _READ: dict[Form, tuple[Any, Callable[[str], Any] | None]] = {
-    Form.NUMBER: (float, number), Form.WHOLE_NUMBER: (int, whole_number), Form.WORD: (str, None),
+    Form.NUMBER: (float, None), Form.WHOLE_NUMBER: (int, whole_number), Form.WORD: (str, None),
     Form.FLAG: (bool, None),
 }  # fmt: skip
 
@@ -76,6 +76,7 @@ _READ: dict[Form, tuple[Any, Callable[[str], Any] | None]] = {
 def _option(one: Option) -> Any:
     """The option of a key, the same for every command."""
     type_, parser = _READ.get(one.form, (list[str], None))
+    parser = inputs.number_in(one.help) if one.form is Form.NUMBER else parser
     offered = completion.words(*one.words) if one.words else _OFFERED.get(one.form)
     told = typer.Option(
         one.flag, metavar=one.metavar or None, parser=parser, help=one.help, autocompletion=offered
@@ -153,7 +154,9 @@ def description(scene: str | None, flags: ProblemFlags, kind: str, **further: tu
     return Description(body=body, options={key: options[key] for key in given}, file=file)
 
 
-def posed(told: Description, study: type[ProblemRequest]) -> tuple[Scene, dict[str, Any]]:
+def posed(
+    told: Description, study: type[ProblemRequest], without: Sequence[str] | None = None
+) -> tuple[Scene, dict[str, Any]]:
     """The scene and the arguments of the design layer, checked as the service checks them.
 
     InputError, SceneError with what is wrong, by the option or the key that has to change.
@@ -162,11 +165,18 @@ def posed(told: Description, study: type[ProblemRequest]) -> tuple[Scene, dict[s
     ----------
     told : what was given.
     study : its types and ranges, and what is wrong with a problem for a scene.
+    without : contacts that are left out.
     """
     from service.jobs.common.problem_requests import arguments
 
-    request = checked(told, study)
-    scene = _with_values(told, _scene(told), request)
+    scene = _scene(told)
+    with told.named():
+        body = {
+            key: value if key == "scene" else inputs.in_units(value, scene, (key,))
+            for key, value in told.body.items()
+        }
+    request = checked(replace(told, body=body), study)
+    scene = inputs.left_out(_with_values(told, scene, request), without)
     given = arguments(request)
     # Before kernels are loaded, which what is wrong with a problem is found by.
     prepare(lambda: cost(study.NAME, scene, given))
@@ -192,9 +202,9 @@ def checked(told: Description, model: type[ProblemRequest]) -> ProblemRequest:
 
 def body_to_submit(told: Description) -> dict[str, Any]:
     """The body for the service; a scene file goes with it, a name is looked up there."""
-    reference = told.body["scene"]
+    reference = _reference(told)
     if isinstance(reference, str) and reference.endswith(SCENE_FILES):
-        return {**told.body, "scene": scene_to_submit(_reference(told))}
+        return {**told.body, "scene": scene_to_submit(reference)}
     return dict(told.body)
 
 
@@ -218,7 +228,7 @@ def _reference(told: Description) -> Any:
     reference = told.body["scene"]
     if isinstance(reference, str) and told.file is not None and "scene" not in told.options:
         return str(told.file.parent / reference) if reference.endswith(SCENE_FILES) else reference
-    return reference
+    return str(found_scene(reference)) if isinstance(reference, str) else reference
 
 
 def _with_values(told: Description, scene: Scene, request: ProblemRequest) -> Scene:
@@ -238,34 +248,35 @@ def _of_flags(flags: ProblemFlags) -> dict[str, Any]:
     return {key: value for key, value in given.items() if value is not None}
 
 
-def _ranges(option: str, texts: Sequence[str], example: str) -> list[list[float]]:
+def _ranges(option: str, texts: Sequence[str], example: str, unit: str | None) -> list[list[float]]:
     """The ranges of a repeatable option LO HI."""
     found = []
     for text in texts:
         words = text.split()
         if len(words) != 2:
             raise InputError(f"`{option}` takes LO HI, for example {example}, got {text!r}")
-        found.append([inputs.part(option, text, word) for word in words])
+        found.append([inputs.part(option, text, word, unit) for word in words])
     return found
 
 
 def _value(option: Option, given: Any) -> Any:
     """The value of a key, from its option as it was written; None if it was not given."""
-    flag, example = option.flag, option.example
+    flag, example, unit = option.flag, option.example, inputs.unit_said(option.help)
     if given is None or given == []:
         return None
     if option.form is Form.BOUNDS:
         return inputs.bounds(flag, given)
     if option.form is Form.RANGES:
-        return _ranges(flag, given, example)
+        return _ranges(flag, given, example, unit)
     if option.form is Form.NAMES:
         return dict.fromkeys(given, option.word)
     if option.form is Form.WORDS_BY_PATH:
         return inputs.by_name(flag, given, example, "NAME=VALUE", once=True)
     if option.form is Form.NUMBER_OR_TABLE and len(given) == 1 and "=" not in given[0]:
-        return inputs.part(flag, given[0], given[0])
+        return inputs.part(flag, given[0], given[0], unit)
     if option.form in (Form.NUMBERS_BY_PATH, Form.NUMBERS_BY_WORD, Form.NUMBER_OR_TABLE):
-        return inputs.numbers(flag, inputs.by_name(flag, given, example, "NAME=VALUE", once=True))
+        words = inputs.by_name(flag, given, example, "NAME=VALUE", once=True)
+        return inputs.numbers(flag, words, None if option.form is Form.NUMBERS_BY_PATH else unit)
     return given
 
 

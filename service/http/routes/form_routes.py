@@ -17,10 +17,11 @@ from service.jobs.strict_json import encoded
 from service.schemas.answers import AnswerModel, AskedModel, KindAnswer, KindList, LawList, law_list
 from solver.contacts.laws.law_registry import laws as known_laws
 from solver.errors import SceneError
+from solver.lab import from_lab, rooms
 from solver.scene.json_schema import plain, scene_schema
-from solver.scene.templates import TEMPLATES, template_schema, template_tables
 
 templates = APIRouter(prefix="/v1", tags=["scenes"], route_class=TypedRoute)
+_known: Any = from_lab("templates.templates") if "templates" in rooms() else None
 
 _ANSWERS: dict[str, Any] = {"template": "platform-damper", "answers": {"frequency_hz": 420, "blades": 60}}
 
@@ -67,8 +68,8 @@ async def list_templates(request: Request) -> Response:
 
 def _templates() -> bytes:
     items = [
-        TemplateAnswer(name=name, title=each.TITLE, questions=template_schema(each))
-        for name, each in TEMPLATES.items()
+        TemplateAnswer(name=name, title=each.TITLE, questions=_known.template_schema(each))
+        for name, each in (_known.TEMPLATES if _known else {}).items()
     ]
     return TemplateList(items=items).model_dump_json().encode()
 
@@ -79,10 +80,11 @@ _TEMPLATES = Constant(_templates)
 @templates.post("/templates")
 async def fill_template(body: FillBody) -> TemplateScene:
     """The scene of a case, made of the answers to its questions; nothing is stored."""
-    if body.template not in TEMPLATES:
-        raise InvalidRequestError.of(("template",), f"must be one of {', '.join(TEMPLATES)}", body.template)
+    names = [*_known.TEMPLATES] if _known else []
+    if body.template not in names:
+        raise InvalidRequestError.of(("template",), f"must be one of {', '.join(names)}", body.template)
     try:
-        return TemplateScene(scene=template_tables(body.template, body.answers))
+        return TemplateScene(scene=_known.template_tables(body.template, body.answers))
     except SceneError as error:
         raise InvalidRequestError([one.below("answers") for one in error.issues]) from error
 

@@ -22,6 +22,8 @@ from service.jobs.kind_registry import Flag, JobRequest, Resolved, SceneSource
 from service.jobs.strict_json import digest
 from solver.errors import Issue, SceneError, SettingError
 from solver.scene.descriptions import DAMPER_LOAD
+from solver.scene.toml import shipped_scenes
+from solver.wording import nearest
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -114,7 +116,7 @@ def resolve_scene(request: OfScene, source: SceneSource) -> Scene:
 @lru_cache(maxsize=64)
 def shipped_scene(name: str) -> Scene | None:
     """The scene of this name that comes with the package, read once; None for another one."""
-    from solver.scene.scene import load_scene, shipped_scenes
+    from solver.scene.scene import load_scene
 
     return load_scene(name) if name in shipped_scenes() else None
 
@@ -125,7 +127,10 @@ def _read(reference: object, source: SceneSource) -> Scene:
         return shipped
     body = source.scene_body(reference) if isinstance(reference, str) else reference
     if not isinstance(body, Mapping):
-        raise InvalidRequestError.of(("scene",), f"{reference!r} is neither a shipped scene nor a stored one")
+        hint = nearest(str(reference), shipped_scenes())
+        raise InvalidRequestError.of(
+            ("scene",), f"{reference!r} is neither a shipped scene nor a stored one{hint}"
+        )
     if body is reference and refers_to_uploads(body):
         try:
             body = source.with_uploads(body)

@@ -70,7 +70,7 @@ class Measured(Study, HarmonicRequest):
     unknowns: Annotated[
         dict[VariableName, Pair],
         Field(min_length=1, max_length=MAX_VARIABLES),
-        Flag("--unknown", "PATH LO HI"),
+        Flag("--variable", "PATH LO HI"),
     ] = Field(description="Parameters looked for: path to [low, high].")
     scaling: Annotated[dict[VariableName, ScalingWord] | None, Flag(metavar="PATH=HOW")] = Field(
         default=None,

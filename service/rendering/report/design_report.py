@@ -272,7 +272,7 @@ def _estimates(scene: Scene, found: Json) -> str:
         path = one["name"].split(",")[0].strip()
         low, high = one["bounds"]
         before = parameter(path, scene.value(path))
-        bounds = f"{low:.6g} to {high:.6g} {one['unit']}".rstrip()
+        bounds = units.span(low, high, one["unit"])
         rows.append([*estimate_row(one), before, bounds])
     if not rows:
         return "<p>There is no estimate.</p>"
@@ -289,7 +289,7 @@ def _fit(found: Json) -> list[str]:
     words = "Measured data, the fit and its 95 % band"
     rows: list[list[Any]] = []
     for run in found["runs"]:
-        under = ", ".join(f"{path} = {value:.6g}" for path, value in run["conditions"].items())
+        under = ", ".join(f"{path} = {units.number(value)}" for path, value in run["conditions"].items())
         rows.append([run["kind"], run["source"], under, len(run["data"])])
     drawn = image(identification_figure(found), words, f"{words}.")
     return ["<h2>The fit</h2>", drawn, table(["kind", "from", "conditions", "points"], rows)]

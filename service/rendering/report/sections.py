@@ -142,7 +142,7 @@ def comparison_figure(scene: Scene, lines: Sequence[ReportLine]) -> Figure:
         page, (axes,) = style.figure(6.6, 4.0)
         for line, curve in curves:
             axes.plot(
-                curve.values, curve.amplitude * unit.per_metre, color=line.color, linestyle=line.dashes,
+                curve.values, curve.amplitude * unit.per_one, color=line.color, linestyle=line.dashes,
                 linewidth=line.width, label=line.name,
             )  # fmt: skip
         axes.set_yscale("log")
@@ -216,7 +216,7 @@ def optimum_section(given: Designed, optima: Mapping[str, Mapping[str, float]]) 
 
 def violation_pair(violation: float) -> tuple[str, str]:
     """How much a limit is exceeded, if any is."""
-    return "largest relative violation of a limit", f"{violation:.1e}" if violation > 0.0 else "none"
+    return "largest relative violation of a limit", units.number(violation, 2) if violation > 0.0 else "none"
 
 
 def branch_table(lines: Sequence[ReportLine]) -> str:
@@ -227,8 +227,8 @@ def branch_table(lines: Sequence[ReportLine]) -> str:
         branch = line.branch
         if line.linear or branch is None or branch.peak is None:
             continue
-        band = "" if branch.band is None else f"{units.number(branch.band.width)} Hz"
-        error, place = units.length(branch.error_estimate), f"{branch.peak.at:.6g} Hz"
+        band = "" if branch.band is None else units.hertz(branch.band.width)
+        error, place = units.length(branch.error_estimate), units.hertz(branch.peak.at)
         certificate = branch.peak_certificate
         rows.append(
             [line.name, units.length(branch.peak.value), error, place, band,
@@ -278,10 +278,10 @@ def scene_section(scene: Scene) -> str:
     about = [
         ("structure", f"{scene.structure.kind}, {len(scene.dofs)} DOFs"),
         *(
-            ("base" if e.base else "force", f"{e.amplitude:g} {e.unit} on {e.place}")
+            ("base" if e.base else "force", f"{units.quantity(e.amplitude, e.unit)} on {e.place}")
             for e in scene.excitation
         ),
-        ("observed", f"{scene.measured.name}, {low:g} to {high:g} Hz"),
+        ("observed", f"{scene.measured.name}, {units.span(low, high, 'Hz')}"),
     ]
     drawing = scene_figure(scene)
     words = f"What {scene.name} consists of: springs, contacts that rub, the force, the double ring observed"

@@ -12,6 +12,7 @@ from solver.contacts.kernels import columns
 from solver.contacts.laws.contact_parts import LawQuantity, RestStiffness
 from solver.contacts.laws.coulomb_2d import SlidesInAPlane
 from solver.contacts.laws.friction import FrictionContact
+from solver.results import units
 
 _CLOSED = (columns.N0, 1)
 
@@ -137,7 +138,11 @@ class SpaceContact(SlidesInAPlane):
     @property
     def evaluation(self) -> str:
         """How its force is found, in the words of a plan."""
-        load = "under a given load" if self.kn is None else f"the load moves with {self.kn:g} N/m"
+        load = (
+            "under a given load"
+            if self.kn is None
+            else f"the load moves with {units.quantity(self.kn, 'N/m')}"
+        )
         if self.limits_apart:
             return f"contact in space, {load}: a limit for each direction, in closed form"
         return f"contact in space, {load}: circular limit, closed form in stick, collocation in slip"

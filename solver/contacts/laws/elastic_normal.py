@@ -10,6 +10,7 @@ from solver.contacts.kernels import columns
 from solver.contacts.laws.contact_parts import LawQuantity, RestStiffness
 from solver.contacts.laws.coulomb import SlidesOnALine
 from solver.contacts.laws.friction import FrictionContact
+from solver.results import units
 
 _CLOSED = (columns.N0, 1)
 
@@ -68,7 +69,8 @@ class ElasticNormalContact(SlidesOnALine):
     @property
     def evaluation(self) -> str:
         """How its force is found, in the words of a plan."""
-        return f"the normal load moves with the parts by {self.kn:g} N/m: friction and load in closed form"
+        moves = units.quantity(self.kn, "N/m")
+        return f"the normal load moves with the parts by {moves}: friction and load in closed form"
 
 
 LAW = ElasticNormalContact

@@ -29,6 +29,7 @@ from solver.contacts.laws.load_harmonics import (
     order_of,
 )
 from solver.errors import SettingError
+from solver.results import units
 
 if TYPE_CHECKING:
     from solver.contacts.pieces.line import Shares
@@ -272,7 +273,7 @@ class FrictionContact(AnyContact):
         if self.normal_port is not None:
             return f"the normal load of {self.name} moves with the parts"
         if self.N1_value != 0.0:
-            return f"the normal load of {self.name} varies by {abs(self.N1_value):g} N"
+            return f"the normal load of {self.name} varies by {units.quantity(abs(self.N1_value), 'N')}"
         # A load of even harmonics is the same half a period later.
         odd = [order for order in self.load.orders if order % 2]
         return f"the normal load of {self.name} varies with harmonic {odd[0]}" if odd else None
@@ -309,8 +310,8 @@ class FrictionContact(AnyContact):
             return True, f"{self.name} opens and closes as it moves"
         least = self.load.least
         if least < 0.0:
-            return True, f"the normal load of {self.name} falls to {least:g} N"
-        return False, f"the normal load of {self.name} stays at {least:g} N or more"
+            return True, f"the normal load of {self.name} falls to {units.quantity(least, 'N')}"
+        return False, f"the normal load of {self.name} stays at {units.quantity(least, 'N')} or more"
 
     def force_at(self, motions: Real, load: Real, tau: Real) -> Real:
         """Return the force along the first motion [N] at the angles `tau`."""

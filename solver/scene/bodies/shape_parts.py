@@ -13,6 +13,7 @@ from solver.contacts.fields import LARGEST
 from solver.contacts.laws.contact_law import AnyContact
 from solver.contacts.laws.coulomb_3d import SpaceContact
 from solver.errors import SettingError
+from solver.results.units import bound_said, doubt_said
 from solver.scene.bodies.body import MOMENTS, REVOLUTIONS, Body
 from solver.scene.bodies.body_shapes import POINTS, AnyShape, Shape
 from solver.scene.bodies.kinematics import outward, placed_forms, spin_of, towards
@@ -202,8 +203,8 @@ def _with_shape(scene: Scene, shape: AnyShape, key: str, path: str, new: float) 
     try:
         made = type(shape).model_validate({**shape.__dict__, **_update(shape, key, new)})
     except ValidationError as error:
-        wanted = str(error.errors()[0]["msg"]).lower()
-        raise SettingError(path, new, f"{wanted} [{_UNITS[key]}]") from error
+        wanted = bound_said(error.errors()[0], _UNITS[key])
+        raise SettingError(path, new, wanted, doubt_said(new, _UNITS[key])) from error
     dampers = tuple(made if each is shape else each for each in scene.dampers)
     own = own_parts(scene)
     bodies = (body for each in dampers for body in each.bodies)

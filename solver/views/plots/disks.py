@@ -57,10 +57,10 @@ def performance_figure(answer: Mapping[str, Any], *, dof: str = "x", ax: Into = 
     places = np.array(answer[over], dtype=np.float64)
     heights = np.array(answer["peak_at_load" if answer["scales"] else "peak"], dtype=np.float64)
     good = np.isfinite(places) & (places > 0.0)
-    unit = units.length_unit(float(heights[good].min(initial=1.0)))
+    unit = units.shown_unit(float(heights[good].min(initial=1.0)))
     with style.styled():
         page, (axes,) = style.figure(5.0, 3.3, into=ax)
-        axes.loglog(places[good], heights[good] * unit.per_metre, color=style.BLUE, label="one mode")
+        axes.loglog(places[good], heights[good] * unit.per_one, color=style.BLUE, label="one mode")
         style.label(axes, f"factor on the {over}", f"peak of {Measured(dof=dof).label('', unit)}")
     return page
 
@@ -141,7 +141,7 @@ def interference_figure(answer: Json, *, ax: Into = None) -> Figure:
         axes.set_ylim(0.0, top)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         style.label(axes, "nodal diameter", "natural frequency [Hz]")
-        at = "" if answer["speed_rpm"] is None else f" at {answer['speed_rpm']:g} rpm"
+        at = "" if answer["speed_rpm"] is None else f" at {units.quantity(answer['speed_rpm'], 'rpm')}"
         axes.set_title(f"{answer['scene']}, {answer['sectors']} sectors{at}")
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=4)
     return page
@@ -208,7 +208,7 @@ def mistuning_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
     """
     factors = np.sort([s["magnification"] for s in answer["samples"] if s["magnification"] is not None])
     worst, tuned = answer["worst"], answer["tuned"]["peak"]
-    unit = units.length_unit(worst["largest"])
+    unit = units.shown_unit(worst["largest"])
     with style.styled():
         page, (shares, blades) = style.figure(8.0, 3.3, columns=2, into=ax)
         shares.step(
@@ -218,13 +218,13 @@ def mistuning_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
         style.label(shares, "magnification, peak / tuned peak", "disks at or below [%]")
         shares.set_ylim(0.0, 103.0)
         shares.set_title(f"{answer['scene']}, {factors.size} disks, spread {answer['spread']:g}")
-        heights = np.array([np.nan if p is None else p for p in worst["peaks"]]) * unit.per_metre
+        heights = np.array([np.nan if p is None else p for p in worst["peaks"]]) * unit.per_one
         draw_blades(
             blades, heights, worst["worst_blade"], Measured.of_result(answer).label("highest peak", unit)
         )
-        blades.axhline(tuned * unit.per_metre, color=style.INK, linewidth=0.9, linestyle=(0, (5.0, 2.5)))
+        blades.axhline(tuned * unit.per_one, color=style.INK, linewidth=0.9, linestyle=(0, (5.0, 2.5)))
         blades.annotate(
-            f"tuned {unit.show(tuned)}", (1.0, tuned * unit.per_metre),
+            f"tuned {unit.show(tuned)}", (1.0, tuned * unit.per_one),
             xycoords=("axes fraction", "data"), xytext=(0, 3), textcoords="offset points", ha="right",
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
         )  # fmt: skip
@@ -241,11 +241,11 @@ def blades_figure(heights: Real, what: str, *, ax: Into = None) -> Figure:
     what : the heights in words.
     """
     known = heights[np.isfinite(heights)]
-    unit = units.length_unit(float(known.max(initial=0.0)))
+    unit = units.shown_unit(float(known.max(initial=0.0)))
     highest = int(np.nanargmax(heights)) if known.size else -1
     with style.styled():
         page, (axes,) = style.figure(5.0, 3.3, into=ax)
-        draw_blades(axes, heights * unit.per_metre, highest, f"{what} [{unit.name}]")
+        draw_blades(axes, heights * unit.per_one, highest, f"{what} [{unit.name}]")
     return page
 
 

@@ -57,7 +57,8 @@ class Motion:
         share = np.linspace(0.0, 1.0, _SAMPLES + 1)
         functions = basis(2.0 * np.pi * share, solution.highest_harmonic)
         return cls(
-            title=f"{solution.scene.name} at {solution.frequency_hz:g} Hz, {solution.n_harmonics} harmonics",
+            title=f"{solution.scene.name} at {units.hertz(solution.frequency_hz)}, "
+            f"{solution.n_harmonics} harmonics",
             dof=solution.scene.observe.dof,
             time=share / solution.frequency_hz,
             displacement=functions @ solution.observed,
@@ -75,7 +76,8 @@ class Motion:
         # Of the whole annulus only the first sector is drawn: the others do the same later.
         first = [i for i, name in enumerate(march.contacts) if name.partition("@")[2] in ("", "0")]
         return cls(
-            title=f"{scene or 'time march'} at {march.frequency_hz:g} Hz{', time march' if scene else ''}",
+            title=f"{scene or 'time march'} at {units.hertz(march.frequency_hz)}"
+            f"{', time march' if scene else ''}",
             dof=dof,
             time=np.append(march.time, period),
             displacement=_closed(march.displacement),
@@ -95,7 +97,7 @@ def motion_figure(motion: Motion, *, ax: Into = None) -> Figure:
     """
     loops = motion.loops[:MOST_LOOPS]
     bars = motion.harmonics is not None
-    unit = units.length_unit(float(np.abs(motion.displacement).max()))
+    unit = units.shown_unit(float(np.abs(motion.displacement).max()))
     with style.styled():
         panels = 1 + len(loops) + bars
         # Four side by side would be too small in a column of text.
@@ -106,13 +108,13 @@ def motion_figure(motion: Motion, *, ax: Into = None) -> Figure:
         for unused in others[panels - 1 :]:
             unused.set_axis_off()
         scale, second = (1e3, "ms") if motion.time[-1] < 0.1 else (1.0, "s")
-        history.plot(motion.time * scale, motion.displacement * unit.per_metre, color=style.BLUE)
+        history.plot(motion.time * scale, motion.displacement * unit.per_one, color=style.BLUE)
         history.margins(x=0.0)
         history.set_title(motion.title)
         style.label(history, f"time [{second}]", f"displacement of {motion.dof} [{unit.name}]")
         for axes, loop in zip(others, loops, strict=False):
-            slip = units.length_unit(float(np.abs(loop.slip).max()))
-            axes.plot(loop.slip * slip.per_metre, loop.force, color=style.VERMILION)
+            slip = units.shown_unit(float(np.abs(loop.slip).max()))
+            axes.plot(loop.slip * slip.per_one, loop.force, color=style.VERMILION)
             axes.set_title(f"contact {loop.contact}")
             style.label(axes, f"slip motion [{slip.name}]", "friction force [N]")
         if motion.harmonics is not None:
@@ -131,14 +133,14 @@ def harmonics_figure(heights: Real, title: str, *, dof: str = "x", ax: Into = No
     """
     with style.styled():
         page, (axes,) = style.figure(5.0, 3.2, into=ax)
-        _draw_harmonics(axes, heights, dof, units.length_unit(float(np.nanmax(heights))))
+        _draw_harmonics(axes, heights, dof, units.shown_unit(float(np.nanmax(heights))))
         axes.set_title(title)
     return page
 
 
-def _draw_harmonics(axes: Axes, heights: Real, dof: str, unit: units.LengthUnit) -> None:
+def _draw_harmonics(axes: Axes, heights: Real, dof: str, unit: units.ShownUnit) -> None:
     """Bars on a logarithmic scale; what is far below the largest is not drawn."""
-    shown = np.where(heights >= _FAR_DOWN * np.nanmax(heights), heights, np.nan) * unit.per_metre
+    shown = np.where(heights >= _FAR_DOWN * np.nanmax(heights), heights, np.nan) * unit.per_one
     axes.bar(np.arange(heights.size), shown, color=style.BLUE, width=0.7)
     axes.set_yscale("log")
     axes.yaxis.set_major_locator(LogLocator(numticks=6))
@@ -176,7 +178,7 @@ def multipliers_figure(found: Stability, *, ax: Into = None) -> Figure:
         axes.set_aspect("equal", adjustable="datalim")
         style.label(axes, "real part of the multiplier", "imaginary part")
         words = "stable" if found.stable else "not stable"
-        axes.set_title(f"{found.frequency_hz:.6g} Hz, {words}")
+        axes.set_title(f"{units.hertz(found.frequency_hz)}, {words}")
     return page
 
 
@@ -186,18 +188,20 @@ def transient_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
     The result is as its `to_json` gives it, with at least one window.
     """
     time, frequency, high, low = (numbers(found[name]) for name in ("time", "frequency_hz", "high", "low"))
-    unit = units.length_unit(found["max_abs"])
-    high, low = high * unit.per_metre, low * unit.per_metre
-    largest = found["max_abs"] * unit.per_metre
+    unit = units.shown_unit(found["max_abs"])
+    high, low = high * unit.per_one, low * unit.per_one
+    largest = found["max_abs"] * unit.per_one
     with style.styled():
         page, (over_time, over_frequency) = style.figure(9.2, 3.6, columns=2, into=ax)
         over_time.fill_between(time, low, high, color=style.BLUE, alpha=0.8, linewidth=0.0)
         over_time.axvline(found["at_seconds"], color=style.VERMILION, linewidth=0.8)
         rates = numbers(found.get("rates") or [])
         if rates.size:
-            sizes = numbers(found["rates_max_abs"]) * unit.per_metre
+            sizes = numbers(found["rates_max_abs"]) * unit.per_one
             over_frequency.semilogx(rates, sizes, "o-", color=style.BLUE, markersize=4.0)
-            over_frequency.set_title(f"slowest: {unit.show(found['max_abs'])} at {found['at_hz']:.5g} Hz")
+            over_frequency.set_title(
+                f"slowest: {unit.show(found['max_abs'])} at {units.hertz(found['at_hz'])}"
+            )
             over_time.set_title(found["scene"])
             style.label(over_time, "time [s]", f"{found['dof']} [{unit.name}]")
             style.label(over_frequency, "rate [Hz/s]", f"largest |{found['dof']}| [{unit.name}]")
@@ -206,7 +210,7 @@ def transient_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
         over_frequency.plot(frequency[ramp], np.maximum(high, -low)[ramp], color=style.BLUE)
         over_frequency.plot([found["at_hz"]], [largest], "o", color=style.VERMILION, markersize=4.0)
         over_time.set_title(found["scene"])
-        over_frequency.set_title(f"largest {unit.show(found['max_abs'])} at {found['at_hz']:.5g} Hz")
+        over_frequency.set_title(f"largest {unit.show(found['max_abs'])} at {units.hertz(found['at_hz'])}")
         style.label(over_time, "time [s]", f"{found['dof']} [{unit.name}]")
         style.label(
             over_frequency, "frequency [Hz]", f"{Measured(dof=found['dof']).name} in a turn [{unit.name}]"

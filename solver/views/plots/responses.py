@@ -70,7 +70,7 @@ def response_figure(
         for low, high in response.intervals:
             axes.axvspan(low, high, color=style.SKY, alpha=0.18, linewidth=0.0)
         # The curve, dashed where it is not stable, with folds, branch points and ends on it.
-        height = response.amplitude * unit.per_metre
+        height = response.amplitude * unit.per_one
         unstable = np.zeros(height.size, bool) if response.unstable is None else response.unstable
         if not unstable.any():
             axes.plot(response.values, height, color=style.BLUE)
@@ -84,7 +84,7 @@ def response_figure(
                 label="not stable",
             )  # fmt: skip
         for kind, marker in _MARKERS.items():
-            places = [(at, value * unit.per_metre) for name, at, value in response.marks if name == kind]
+            places = [(at, value * unit.per_one) for name, at, value in response.marks if name == kind]
             if places:
                 axes.plot(
                     *zip(*places, strict=True), color=style.INK, marker=marker, markersize=4.5,
@@ -113,9 +113,10 @@ def family_figure(family: Family) -> Figure:
         shades = [tuple(colormaps["viridis"](place)) for place in np.linspace(0.85, 0.1, len(family.members))]
         for (value, curve), shade in zip(family.members, shades, strict=True):
             if value == family.optimum:
-                _draw(axes, curve, unit, f"{value:.4g} (optimum)", color=style.VERMILION, width=2.2, order=3)
+                name = f"{units.number(value)} (optimum)"
+                _draw(axes, curve, unit, name, color=style.VERMILION, width=2.2, order=3)
             else:
-                _draw(axes, curve, unit, f"{value:.4g}", color=shade)
+                _draw(axes, curve, unit, units.number(value), color=shade)
         _draw(axes, family.stuck, unit, "stuck (linear)", color=style.GREY, dashes=_DASHED)
         axes.set_yscale("log")
         style.plain_log(axes.yaxis)
@@ -146,10 +147,10 @@ def peak_figure(
     measured : what the peak is of.
     """
     unit = measured.unit_for(optimum[1])
-    best, least = optimum[0], optimum[1] * unit.per_metre
+    best, least = optimum[0], optimum[1] * unit.per_one
     with style.styled():
         page, (axes,) = style.figure(6.0, 3.4)
-        axes.plot(values, peaks * unit.per_metre, color=style.BLUE, marker="o", markersize=3.0)
+        axes.plot(values, peaks * unit.per_one, color=style.BLUE, marker="o", markersize=3.0)
         axes.plot(
             [best], [least], color=style.VERMILION, marker="o", markersize=6.5, linestyle="none", zorder=5
         )
@@ -161,7 +162,7 @@ def peak_figure(
         for axis, scale in ((axes.xaxis, axes.set_xscale), (axes.yaxis, axes.set_yscale)):
             scale("log")
             style.plain_log(axis)
-        low, high = min(least, float(peaks.min()) * unit.per_metre), float(peaks.max()) * unit.per_metre
+        low, high = min(least, float(peaks.min()) * unit.per_one), float(peaks.max()) * unit.per_one
         # Room for the two lines of text below the curve, as a share of the logarithmic height.
         axes.set_ylim(low * (low / high) ** 0.35, high * (high / low) ** 0.06)
         style.label(axes, axis_name(variable), measured.label("highest peak", unit))
@@ -176,38 +177,38 @@ def axis_name(path: str) -> str:
 
 
 def _draw(
-    axes: Axes, curve: Response, unit: units.LengthUnit, name: str, *, color: object, width: float = 1.2,
+    axes: Axes, curve: Response, unit: units.ShownUnit, name: str, *, color: object, width: float = 1.2,
     dashes: tuple[int, tuple[float, ...]] | str = "-", order: float = 2,
 ) -> None:  # fmt: skip
-    height = curve.amplitude * unit.per_metre
+    height = curve.amplitude * unit.per_one
     axes.plot(curve.values, height, color=color, linewidth=width, linestyle=dashes, label=name, zorder=order)
 
 
-def _mark_peak(axes: Axes, curve: Response, peak: tuple[float, float], unit: units.LengthUnit) -> None:
+def _mark_peak(axes: Axes, curve: Response, peak: tuple[float, float], unit: units.ShownUnit) -> None:
     """A dot at the peak, and above it what it is."""
     at, height = peak
     low, high = float(curve.values.min()), float(curve.values.max())
     place = (at - low) / (high - low) if high > low else 0.5
     side = "left" if place < 0.2 else "right" if place > 0.8 else "center"
-    axes.plot([at], [height * unit.per_metre], color=style.VERMILION, marker="o", markersize=5.0, zorder=5)
+    axes.plot([at], [height * unit.per_one], color=style.VERMILION, marker="o", markersize=5.0, zorder=5)
     text = f"{unit.show(height)} at {style.quantity(curve.parameter, at, 5)}"
     axes.annotate(
-        text, (at, height * unit.per_metre), xytext=(0, 7), textcoords="offset points", ha=side,
+        text, (at, height * unit.per_one), xytext=(0, 7), textcoords="offset points", ha=side,
         color=style.VERMILION, bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
     )  # fmt: skip
 
 
-def _mark_demands(axes: Axes, asked: Demands, unit: units.LengthUnit) -> None:
+def _mark_demands(axes: Axes, asked: Demands, unit: units.ShownUnit) -> None:
     """Lines at the limits, named at their right ends; forbidden ranges hatched above the limit."""
     lines = [("limit", asked.limit), ("largest peak allowed", asked.max_peak)]
-    heights = [height * unit.per_metre for _, height in lines if height is not None]
+    heights = [height * unit.per_one for _, height in lines if height is not None]
     low, high = axes.get_xlim()
     top = max([axes.get_ylim()[1], *(1.12 * height for height in heights)])
     axes.set_ylim(top=top)
     for begin, end in asked.forbidden:
         if end <= low or begin >= high:
             continue
-        bottom = 0.0 if asked.limit is None else asked.limit * unit.per_metre
+        bottom = 0.0 if asked.limit is None else asked.limit * unit.per_one
         axes.fill_between(
             [max(begin, low), min(end, high)], bottom, top, facecolor="none", edgecolor=style.VERMILION,
             hatch="////", alpha=0.55, linewidth=0.0, zorder=1,
@@ -219,9 +220,9 @@ def _mark_demands(axes: Axes, asked: Demands, unit: units.LengthUnit) -> None:
             _mark_limit(axes, name, height, unit)
 
 
-def _mark_limit(axes: Axes, name: str, limit: float, unit: units.LengthUnit) -> None:
+def _mark_limit(axes: Axes, name: str, limit: float, unit: units.ShownUnit) -> None:
     """A line at a limit, named at its right end."""
-    height = limit * unit.per_metre
+    height = limit * unit.per_one
     axes.axhline(height, color=style.INK, linewidth=0.9, linestyle=_DASHED)
     axes.annotate(
         f"{name} {unit.show(limit)}", (1.0, height), xycoords=("axes fraction", "data"), xytext=(0, 3),

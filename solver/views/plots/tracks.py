@@ -36,21 +36,21 @@ def track_figure(track: Json, *, ax: Into = None) -> Figure:
     with style.styled():
         page, (heights, places) = style.figure(9.2, 3.6, columns=2, into=ax)
         for line in track["competing"]:
-            higher = numbers(line["peak"]) * unit.per_metre
+            higher = numbers(line["peak"]) * unit.per_one
             heights.plot(line["parameter"], higher, color=style.GREY, linewidth=0.8)
             places.plot(line["parameter"], line["frequency"], color=style.GREY, linewidth=0.8)
-        heights.plot(parameter, peak * unit.per_metre, color=style.BLUE)
+        heights.plot(parameter, peak * unit.per_one, color=style.BLUE)
         places.plot(*ridge_lines(track), color=style.BLUE)
         at, least = track["optimum"]["at"], track["optimum"]["peak"]
         if at is not None:
-            heights.plot([at], [least * unit.per_metre], **_DOT)
+            heights.plot([at], [least * unit.per_one], **_DOT)
             for one in track["optimum"]["active"]:
                 places.plot([at], [one["frequency"]], **_DOT)
             # At an end of the range the text stands inside.
             side = {float(parameter.min()): "left", float(parameter.max()): "right"}.get(at, "center")
             text = f"least at {style.quantity(track['parameter_path'], at, 5)}\n{unit.show(least)}"
             heights.annotate(
-                text, (at, least * unit.per_metre), xytext=(0, -10), textcoords="offset points",
+                text, (at, least * unit.per_one), xytext=(0, -10), textcoords="offset points",
                 ha=side, va="top", color=style.VERMILION, linespacing=1.35,
             )  # fmt: skip
         for axes in (heights, places):
@@ -60,7 +60,7 @@ def track_figure(track: Json, *, ax: Into = None) -> Figure:
             axes.margins(x=0.0)
         heights.set_yscale("log")
         style.plain_log(heights.yaxis)
-        low, high = peak.min() * unit.per_metre, peak.max() * unit.per_metre
+        low, high = peak.min() * unit.per_one, peak.max() * unit.per_one
         heights.set_ylim(low * (low / high) ** 0.35, high * (high / low) ** 0.06)
         style.label(heights, axis_name(track["parameter_path"]), measured.label("highest peak", unit))
         style.label(places, axis_name(track["parameter_path"]), "frequency of the peak [Hz]")
@@ -80,11 +80,11 @@ def map_figure(found: Json, *, ax: Into = None) -> Figure:
     known = amplitude[np.isfinite(amplitude) & (amplitude > 0.0)]
     measured = Measured.of_result(found)
     unit = measured.unit_for(float(np.median(known)))
-    scale = LogNorm(float(known.min()) * unit.per_metre, float(known.max()) * unit.per_metre)
+    scale = LogNorm(float(known.min()) * unit.per_one, float(known.max()) * unit.per_one)
     with style.styled():
         page, (axes,) = style.figure(6.8, 4.2, into=ax)
         mesh = axes.pcolormesh(
-            frequency, parameter, amplitude * unit.per_metre, norm=scale, cmap="viridis",
+            frequency, parameter, amplitude * unit.per_one, norm=scale, cmap="viridis",
             shading="nearest", rasterized=True,
         )  # fmt: skip
         axes.grid(visible=False)

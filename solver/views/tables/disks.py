@@ -9,6 +9,7 @@ from solver.results import units
 from solver.results.known import Measured, known_pairs
 from solver.results.order_statistics import quantile_words
 from solver.results.told import Block, ResultTable, Summary
+from solver.results.units import duration, hertz, quantity, span
 from solver.views.tables.responses import proved
 
 _DIRECTIONS = {"standing": "", "both": "", "forward": " forward", "backward": " backward"}
@@ -30,21 +31,22 @@ def interference(found: Mapping[str, Any]) -> Iterator[Block]:
     if found["speed_rpm"] is not None:
         crossings = [
             (
-                str(one["order"]), f"{one['frequency_hz']:.6g}",
+                str(one["order"]), units.number(one['frequency_hz']),
                 f"{one['diameter']}{'' if one['wave'] == 'standing' else ' ' + one['wave']}",
                 str(one["family"]),
-                f"{one['open_hz']:.6g} to {one['stuck_hz']:.6g}",
-                "meets it" if one["inside"] else f"{100.0 * one['margin']:.3g} % away",
+                f"{units.number(one['open_hz'])} to {units.number(one['stuck_hz'])}",
+                "meets it" if one["inside"] else f"{units.number(100.0 * one['margin'], 3)} % away",
             )
             for one in found["crossings"]
         ]  # fmt: skip
-        title = f"orders within {100.0 * found['within']:g} % of a family at {found['speed_rpm']:g} rpm"
+        speed = quantity(found["speed_rpm"], "rpm")
+        title = f"orders within {100.0 * found['within']:g} % of a family at {speed}"
         names = ("order", "frequency [Hz]", "nodal diameter", "family", "open to stuck [Hz]", "")
         yield ResultTable(title, names, crossings)
     pairs = []
     if found["missing"]:
         pairs.append(("warning", MISSING.format(", ".join(map(str, found["missing"])))))
-    pairs.append(("time", units.duration(found["seconds"])))
+    pairs.append(("time", duration(found["seconds"])))
     yield Summary("", pairs)
 
 
@@ -59,51 +61,54 @@ def mistuning(found: Mapping[str, Any]) -> Iterator[Block]:
     pairs = []
     if tuned["peak"] is not None:
         height = units.length(tuned["peak"])
-        pairs.append((f"tuned, {Measured.of_result(found).name}", f"{height} at {tuned['at_hz']:.6g} Hz"))
+        pairs.append((f"tuned, {Measured.of_result(found).name}", f"{height} at {hertz(tuned['at_hz'])}"))
     if found["mean"] is not None:
         # How well the mean is known: by the error of the peaks, and as that of a few disks of all.
         by_peaks, by_disks = found.get("mean_error"), found.get("standard_error")
         of_peaks = "" if by_peaks is None else f", known to {by_peaks:.2g} by the error of the peaks"
         known = of_peaks + (
-            "" if by_disks is None else f", standard error {by_disks:.2g} by the number of disks"
+            "" if by_disks is None else f", standard error {units.number(by_disks, 2)} by the number of disks"
         )
-        pairs.append(("magnification", f"{found['mean']:.4g} in the mean{known}"))
+        pairs.append(("magnification", f"{units.number(found['mean'])} in the mean{known}"))
         if found["deviation"] is not None:
-            pairs.append(("  deviation of the disks", f"{found['deviation']:.2g}"))
+            pairs.append(("  deviation of the disks", units.number(found["deviation"], 2)))
     pairs += [
         (f"  {100.0 * quantile['share']:g} % below", quantile_words(quantile, "magnification", "disks"))
         for quantile in found["quantiles"]
     ]
     if worst is not None:
         blade, factors = worst["worst_blade"], ", ".join(f"{factor:.4f}" for factor in worst["factors"])
-        place = f"blade {blade} at {worst['at_hz'][blade]:.6g} Hz"
+        place = f"blade {blade} at {hertz(worst['at_hz'][blade])}"
         error = worst.get("magnification_error")
-        known = "" if error is None else f" ± {error:.2g}"
         pairs.append(
-            ("worst", f"{worst['magnification']:.4g}{known}: {units.length(worst['largest'])}, {place}")
+            (
+                "worst",
+                f"{quantity(worst['magnification'], '', error)}: {units.length(worst['largest'])}, {place}",
+            )
         )
         pairs.append(("  its disk", f"seed {worst['seed']}, factors {factors}"))
     pairs += known_pairs(found)
-    pairs.append(("time", units.duration(found["seconds"])))
+    pairs.append(("time", duration(found["seconds"])))
     yield Summary(f"{title}, {found['n_harmonics']} harmonics", pairs)
 
 
 _MOST_ROWS = 40
 _LEVEL = 1e-9  # relative difference of damping ratios that is none
 _Column = tuple[str, str, Callable[[Any], str]]  # its head, key, and how a value is told
-_AMPLITUDE: _Column = "a [√kg m]", "amplitude", "{:.4g}".format
-_FREQUENCY: _Column = "frequency [Hz]", "frequency", "{:.6g}".format
-_FACTOR: _Column = "× excitation", "excitation", "{:.4g}".format
+_AMPLITUDE: _Column = "a [√kg m]", "amplitude", units.number
+_FREQUENCY: _Column = "frequency [Hz]", "frequency", units.number
+_FACTOR: _Column = "× excitation", "excitation", units.number
 
 
 def held(found: Mapping[str, Any]) -> Iterator[Block]:
     """Frequency, force, phase and states of the contacts where one amplitude is held."""
     size = units.length(found["amplitude"])
     title = f"{found['scene']}, |{found['dof']}| held at {size}, {found['n_harmonics']} harmonics"
-    pairs = [("points", str(len(found["frequency"]))), ("time", units.duration(found["seconds"]))]
+    pairs = [("points", str(len(found["frequency"]))), ("time", duration(found["seconds"]))]
     if found["least"] is not None:
         best = found["least"]
-        pairs.insert(0, ("least force", f"{best['excitation']:.5g} times, at {best['frequency']:.6g} Hz"))
+        at = hertz(best["frequency"])
+        pairs.insert(0, ("least force", f"{units.number(best['excitation'])} times, at {at}"))
     if found["stability_unknown"]:
         pairs.append(("stability", found["stability_unknown"]))
     phase = "phase [deg]", "phase", "{:.1f}".format
@@ -113,7 +118,7 @@ def held(found: Mapping[str, Any]) -> Iterator[Block]:
 
 def resonance(found: Mapping[str, Any]) -> Iterator[Block]:
     """Amplitude, frequency, force and states of the contacts in phase resonance."""
-    pairs = [("points", str(len(found["frequency"]))), ("time", units.duration(found["seconds"]))]
+    pairs = [("points", str(len(found["frequency"]))), ("time", duration(found["seconds"]))]
     title = f"{found['scene']}, phase resonance of mode {found['mode']}"
     yield from _curve(found, title, pairs, [_AMPLITUDE, _height(found), _FREQUENCY, _FACTOR])
 
@@ -131,11 +136,11 @@ def mode(found: Mapping[str, Any]) -> Iterator[Block]:
         # Where damping is level, rounding would choose among its places.
         ratios = found["damping_ratio"]
         best = next(i for i, one in enumerate(ratios) if one >= max(ratios) - _LEVEL * abs(max(ratios)))
-        at = f"a = {found['amplitude'][best]:.4g} √kg m, {found['frequency'][best]:.6g} Hz"
-        pairs.insert(0, ("most damping", f"{ratios[best]:.5g} at {at}"))
-    pairs.append(("time", units.duration(found["seconds"])))
+        size, at = quantity(found["amplitude"][best], "√kg m"), hertz(found["frequency"][best])
+        pairs.insert(0, ("most damping", f"{units.number(ratios[best])} at a = {size}, {at}"))
+    pairs.append(("time", duration(found["seconds"])))
     pairs += proved(found.get("certificates") or ())
-    damping = ("damping ratio", "damping_ratio", "{:.5g}".format), ("± by harmonics", "damping_error", _error)
+    damping = ("damping ratio", "damping_ratio", units.number), ("± by harmonics", "damping_error", _error)
     yield from _curve(found, title, pairs, [_AMPLITUDE, _height(found), _FREQUENCY, *damping])
     if found.get("performance"):
         yield from _performance(found["performance"], found["dof"])
@@ -166,18 +171,24 @@ def _performance(curve: Mapping[str, Any], dof: str) -> Iterator[Block]:
     rows = []
     for i in _thinned(len(curve["excitation"])):
         row = [
-            f"{curve['excitation'][i]:.4g}",
+            units.number(curve["excitation"][i]),
             units.length(curve["peak"][i]),
-            f"{curve['frequency'][i]:.6g}",
+            units.number(curve["frequency"][i]),
         ]
         known = curve["scales"] and curve["load"][i] is not None
-        row += [f"{curve['load'][i]:.4g}", units.length(curve["peak_at_load"][i])] if known else ["", ""]
+        row += [units.number(curve["load"][i]), units.length(curve["peak_at_load"][i])] if known else ["", ""]
         rows.append(row)
     yield ResultTable("Peaks of this mode alone", heads, rows)
     if curve["least"] is not None:
         best = curve["least"]
         yield Summary(
-            "", [("least peak", f"{units.length(best['peak'])} with {best['load']:.4g} times the loads")]
+            "",
+            [
+                (
+                    "least peak",
+                    f"{units.length(best['peak'])} with {quantity(best['load'], '')} times the loads",
+                )
+            ],
         )
 
 
@@ -185,33 +196,33 @@ def _cycles(found: Mapping[str, Any], dof: str) -> Summary:
     """Limit cycles, and the most the damper holds."""
     pairs, named = [], Measured(dof=dof).name
     if found["most_damping"] is not None:
-        most = f"ζ = {found['most_damping']:.5g} ± {_error(found['most_error'])}"
+        most = f"ζ = {units.number(found['most_damping'])} ± {_error(found['most_error'])}"
         end = ", the end of the curve: more may be held beyond" if found["most_at_end"] else ""
-        pairs.append(("most that is held", f"{most} at a = {found['most_at']:.4g} √kg m{end}"))
+        pairs.append(("most that is held", f"{most} at a = {quantity(found['most_at'], '√kg m')}{end}"))
     for cycle in found["cycles"]:
         name = {True: "stable cycle", False: "unstable cycle", None: "cycle"}[cycle["stable"]]
-        size = f"{named} {units.length(cycle['max_abs'])} ± {_error(cycle['max_abs_error'], units.length)}"
-        at = f"{cycle['frequency']:.6g} ± {_error(cycle['frequency_error'])} Hz"
-        pairs.append((name, f"a = {cycle['amplitude']:.6g} √kg m, {size}, {at}"))
+        size = f"{named} {units.length(cycle['max_abs'])} ± {_error(cycle['max_abs_error'], 'm')}"
+        at = quantity(cycle["frequency"], "Hz", cycle["frequency_error"])
+        pairs.append((name, f"a = {quantity(cycle['amplitude'], '√kg m')}, {size}, {at}"))
         if cycle["stable"] is None:
             mode = "attracts" if cycle["attracts"] else "repels"
             pairs.append(("", f"the mode alone {mode}; stability not known: {cycle['growth']}"))
     for low, high in found["unsolved"]:
-        pairs.append(("not solved", f"a = {low:.6g} to {high:.6g} √kg m: a cycle may be there"))
+        pairs.append(("not solved", f"a = {span(low, high, '√kg m')}: a cycle may be there"))
     if not found["cycles"]:
         pairs.append(("limit cycles", "none between these amplitudes"))
     if found.get("load_for") is not None:
         asked = found["load_for"]
-        pairs.append((f"holds a = {asked['disturbance']:.6g} √kg m", asked["words"]))
+        pairs.append((f"holds a = {quantity(asked['disturbance'], '√kg m')}", asked["words"]))
     if not found["completed"]:
         pairs.append(("not complete", "the curve ends before its largest amplitude: more may be beyond"))
     on = ", on this mode alone" if found["mode_alone"] else ""
     return Summary(f"Aerodynamic damping ratio {found['aero_damping']:g}{on}", pairs)
 
 
-def _error(value: float | None, told: Callable[[float], str] = "{:.2g}".format) -> str:
+def _error(value: float | None, unit: str = "") -> str:
     """What more harmonics would change."""
-    return "not known" if value is None else told(value)
+    return "not known" if value is None else quantity(value, unit, digits=2)
 
 
 def _states(found: Mapping[str, Any], i: int) -> str:

@@ -21,6 +21,7 @@ from solver.results.known import (
     stable_pairs,
 )
 from solver.results.told import Block, ResultTable, Summary
+from solver.results.units import duration, hertz, number, quantity, span
 from solver.scene.parameter_paths import parameter
 
 Json = Mapping[str, Any]
@@ -37,7 +38,7 @@ def plan(found: Json) -> Iterator[Block]:
     effects = [("yes" if e["used"] else "no", e["name"], e["reason"]) for e in found["effects"]]
     yield ResultTable(f"Plan of {found['scene']}", _EFFECT_COLUMNS, effects)
     seconds = found["estimated_seconds_of_stability"]
-    stability = "not known" if seconds is None else f"about {units.duration(seconds)} a response"
+    stability = "not known" if seconds is None else f"about {duration(seconds)} a response"
     yield Summary(
         "",
         [
@@ -46,9 +47,9 @@ def plan(found: Json) -> Iterator[Block]:
                 f"{found['unknowns']} ({found['contacts']} contacts, {found['n_harmonics']} harmonics)",
             ),
             ("linear DOFs", str(found["linear_dofs"])),
-            ("dense matrices", f"{found['estimated_dense_bytes'] / 1e6:.3g} MB"),
+            ("dense matrices", f"{number(found['estimated_dense_bytes'] / 1e6, 3)} MB"),
             ("performance curve", found["performance_curve"]),
-            ("estimated cost", f"{units.duration(found['estimated_seconds_a_point'])} a point of a branch"),
+            ("estimated cost", f"{duration(found['estimated_seconds_a_point'])} a point of a branch"),
             ("stability", stability),
             *note_pairs(found),
         ],
@@ -60,14 +61,12 @@ def solution(found: Json) -> Iterator[Block]:
     if found.get("solutions") is not None:
         yield from _all_solutions(found)
         return
-    title = f"{found['scene']} at {found['frequency_hz']:g} Hz, {found['n_harmonics']} harmonics"
+    title = f"{found['scene']} at {hertz(found['frequency_hz'])}, {found['n_harmonics']} harmonics"
     if not found["converged"]:
         yield Summary(title, [("converged", "no"), *_drift(found), *_notes(found)])
         return
-    pairs = _amplitudes(found)
-    if found["error_estimate"] is not None:
-        of = WORDS[HALF_PEAK_TO_PEAK if "mean_undetermined" in found["flags"] else MAX_ABS]
-        pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of {of}"))
+    of = HALF_PEAK_TO_PEAK if "mean_undetermined" in found["flags"] else MAX_ABS
+    pairs = _amplitudes(found, of, found["error_estimate"])
     pairs += proved([found["certificate"]] if found.get("certificate") else [])
     # The first five; what rounding leaves of one is 0.
     amplitudes = found["harmonics"]
@@ -86,7 +85,7 @@ def solution(found: Json) -> Iterator[Block]:
     low, high = found.get("mean_range", (None, None))
     if low is not None and high is not None:
         pairs.append(("mean, any history", f"{units.length(low)} to {units.length(high)}"))
-    pairs += [("residual", f"{found['residual']:.1e}"), ("time", units.duration(found["seconds"]))]
+    pairs += [("residual", number(found["residual"], 2)), ("time", duration(found["seconds"]))]
     yield Summary(title, pairs)
 
 
@@ -106,7 +105,7 @@ def proved(proofs: Iterable[Json]) -> Pairs:
         held = of == "response" and proof["held"]
         what = WORDS[HALF_PEAK_TO_PEAK if held else MAX_ABS] if of == "response" else of
         low, high = proof["half_peak_to_peak" if held else "max_abs"]
-        at = "" if of == "response" else f" at {proof['frequency_hz'][0]:.12g} Hz"
+        at = "" if of == "response" else f" at {hertz(proof['frequency_hz'][0])}"
         factor = proof["load_factor"]
         least = f", the load {factor[0]!r} to {factor[1]!r} of that" if of == "least peak" else ""
         pairs.append(("proved", f"{what} from {low!r} to {high!r} m{at}{least}"))
@@ -131,14 +130,14 @@ def _all_solutions(found: Json) -> Iterator[Block]:
                 units.length(each["half_peak_to_peak"]),
                 units.length(each["mean"]),
                 "not known" if stable is None else "stable" if stable["stable"] else "not stable",
-                "" if stable is None else f"{stable['radius']:.4g}",
+                "" if stable is None else number(stable["radius"]),
                 each["found_by"],
                 f"max|x| {' to '.join(map(units.length, ends))}" if ends else "",
             )
         )
     if found["solutions"]:
         first = found["solutions"][0]
-        title = f"{first['scene']} at {first['frequency_hz']:g} Hz, {first['n_harmonics']} harmonics"
+        title = f"{first['scene']} at {hertz(first['frequency_hz'])}, {first['n_harmonics']} harmonics"
         yield ResultTable(title, _SOLUTION_COLUMNS, rows)
     alone = f"{found['unique']}: {found['unique_ground']}"
     yield Summary("", [("one response alone", alone), ("note", found["note"])])
@@ -148,21 +147,19 @@ def branch(found: Json) -> Iterator[Block]:
     """A branch: its peaks and its band."""
     path = found["parameter_path"]
     pairs = [*Measured.of_result(found).pairs, *_peaks(found, path)]
-    if found["error_estimate"] is not None:
-        pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of the highest"))
     pairs += stable_pairs(found, "stable at the peak")
     if found.get("mean_undetermined"):
         pairs.append(("note", "at the highest peak " + FLAGS["mean_undetermined"]))
     if found["band_hz"] is not None:
-        above = f"{units.number(found['band_hz'])} Hz above {units.length(found['band_limit'])}"
-        intervals = [f"{low:.6g} to {high:.6g}" for low, high in found["band_intervals_hz"]]
+        above = f"{hertz(found['band_hz'])} above {_size(found, found['band_limit'])}"
+        intervals = [span(low, high, "Hz") for low, high in found["band_intervals_hz"]]
         pairs.append(("band", f"{above}: {', '.join(intervals)}" if intervals else above))
     effort = f"{found['newton_iterations']} Newton iterations, {found['rejected_steps']} steps rejected"
     pairs += sure_of(found)
     pairs += _drift(found)
     pairs += _notes(found) + _marks(found, path)
     pairs.append(("points", f"{found['points']} ({effort}, {found['folds']} folds)"))
-    pairs.append(("time", units.duration(found["seconds"])))
+    pairs.append(("time", duration(found["seconds"])))
     yield Summary(title_over(found), pairs)
 
 
@@ -178,7 +175,7 @@ def _marks(found: Json, path: str) -> Pairs:
     pairs = [
         (
             mark["kind"].replace("_", " "),
-            f"{units.length(mark['amplitude'])} at {parameter(path, mark['at'])}",
+            f"{_size(found, mark['amplitude'])} at {parameter(path, mark['at'])}",
         )
         for mark in found.get("marks", ())
     ]
@@ -208,37 +205,39 @@ def sure_of(found: Json) -> Pairs:
 
 def march(found: Json) -> Iterator[Block]:
     """What a time march came to."""
-    pairs = _amplitudes(found)
-    if found["error_estimate"] is not None:
-        pairs.append(("estimated error", f"{found['error_estimate']:.1e} of max|x|"))
+    share = found["error_estimate"]
+    pairs = _amplitudes(found, MAX_ABS, None if share is None else share * (found[MAX_ABS] or 0.0))
     pairs.append(("periods", f"{found['periods']} of {found['steps_per_period']} steps"))
-    pairs.append(("time", units.duration(found["seconds"])))
+    pairs.append(("time", duration(found["seconds"])))
     yield Summary("Time march", pairs)
 
 
 def transient(found: Json) -> Iterator[Block]:
     """What a run through a range of frequencies came to."""
-    begin, end = units.number(found["begin_hz"]), units.number(found["end_hz"])
     pairs = []
     if found["max_abs"] is not None:
-        at = f"{units.number(found['at_hz'])} Hz, after {units.number(found['at_seconds'])} s"
-        pairs.append(("largest max|x|", f"{units.length(found['max_abs'])} at {at}"))
-    if found["error_estimate"] is not None:
-        pairs.append(("estimated error", f"{found['error_estimate']:.1e} of it"))
+        at = f"{hertz(found['at_hz'])}, after {quantity(found['at_seconds'], 's')}"
+        share = found["error_estimate"]
+        error = None if share is None else share * found["max_abs"]
+        pairs.append(("largest max|x|", f"{_size(found, found['max_abs'], error)} at {at}"))
     for rate, size in zip(found.get("rates") or [], found.get("rates_max_abs") or [], strict=True):
-        pairs.append((f"at {units.number(rate)} Hz/s", units.length(size)))
-    took = f"{units.number(found['ramp_seconds'])} s"
+        pairs.append((f"at {quantity(rate, 'Hz/s')}", units.length(size)))
+    took = quantity(found["ramp_seconds"], "s")
     if found["ring_down_seconds"] > 0.0:
-        took += f", then {units.number(found['ring_down_seconds'])} s without excitation"
+        took += f", then {quantity(found['ring_down_seconds'], 's')} without excitation"
     pairs += [("run", took), ("steps", f"{found['steps_per_period']} a period of the highest frequency")]
-    pairs.append(("time", units.duration(found["seconds"])))
-    yield Summary(f"{found['scene']} from {begin} to {end} Hz", pairs)
+    pairs.append(("time", duration(found["seconds"])))
+    yield Summary(f"{found['scene']} from {span(found['begin_hz'], found['end_hz'], 'Hz')}", pairs)
 
 
-def _amplitudes(found: Json) -> Pairs:
+def _size(found: Json, value: float, error: float | None = None) -> str:
+    """An amplitude of a result with its error, in its own unit."""
+    return quantity(value, Measured.of_result(found).unit, error)
+
+
+def _amplitudes(found: Json, of: str, error: float | None) -> Pairs:
     known = {key: found[key] for key in WORDS if found[key] is not None}
-    show = units.length_unit(max((abs(value) for value in known.values()), default=0.0)).show
-    return [(WORDS[key], show(value)) for key, value in known.items()]
+    return [(WORDS[key], _size(found, value, error if key == of else None)) for key, value in known.items()]
 
 
 def _peaks(found: Json, path: str) -> Pairs:
@@ -248,4 +247,8 @@ def _peaks(found: Json, path: str) -> Pairs:
     highest = "peak" if peak in interior else "highest, at an end"
     others = [other for other in interior if other != peak]
     named = [(highest, peak), *(("further peak", other) for other in others)]
-    return [(name, f"{units.length(p['value'])} at {parameter(path, p['at'])}") for name, p in named]
+    errors = (found["error_estimate"], *(None for _ in others))
+    sizes = [_size(found, p["value"], error) for (_, p), error in zip(named, errors, strict=True)]
+    return [
+        (name, f"{size} at {parameter(path, p['at'])}") for (name, p), size in zip(named, sizes, strict=True)
+    ]

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from solver.results import units
 from solver.results.known import Measured, known_pairs
 from solver.results.told import Block, ResultTable, Summary
+from solver.results.units import duration, hertz, length, number, quantity, span
 from solver.scene.parameter_paths import parameter
 from solver.views.tables.responses import proved, title_over
 
@@ -26,7 +26,7 @@ def track(found: Json) -> Iterator[Block]:
         *proved(found.get("certificates") or ()),
     ]
     pairs.append(("points", f"{len(found['parameter'])}, {found['sweeps']} sweeps"))
-    pairs.append(("time", units.duration(found["seconds"])))
+    pairs.append(("time", duration(found["seconds"])))
     yield Summary(title_over(found), pairs)
 
 
@@ -40,18 +40,19 @@ def response_map(found: Json) -> Iterator[Block]:
         if value is not None
     ]
     size = f"{len(found['parameter'])} × {len(found['frequency'])}"
-    pairs = [("points", f"{size}, {len(known)} solved, largest residual {found['largest_residual']:.1e}")]
+    worst = number(found["largest_residual"], 2)
+    pairs = [("points", f"{size}, {len(known)} solved, largest residual {worst}")]
     pairs += Measured.of_result(found).pairs
     if known:
         value, frequency, at = max(known)
-        place = f"{frequency:.6g} Hz, {path} {parameter(path, at)}"
-        pairs.append(("highest of the grid", f"{units.length(value)} at {place}"))
+        place = f"{hertz(frequency)}, {path} {parameter(path, at)}"
+        pairs.append(("highest of the grid", f"{length(value)} at {place}"))
     if found["ridge"] is not None:
         pairs += [*_ridge(found["ridge"]), *_plateau(found["ridge"])]
     else:
         pairs.append(("note", ON_THE_GRID))
     pairs += _sure(found if "measure" in found else found["ridge"] or {})
-    pairs.append(("time", units.duration(found["seconds"])))
+    pairs.append(("time", duration(found["seconds"])))
     yield Summary(title_over(found), pairs)
 
 
@@ -59,8 +60,8 @@ def margin(found: Json) -> Iterator[Block]:
     """What each damper allows, and the stress of each over the excitation."""
     level, unit = found["level"], found["level_unit"]
     what = "stress" if found["judged_by"] == "utilisation" else "amplitude"
-    title = f"{found['scene']}, excitation from {level[0]:.6g} to {level[-1]:.6g} {unit}"
-    pairs = [("time", units.duration(found["seconds"]))]
+    title = f"{found['scene']}, excitation from {span(level[0], level[-1], unit)}"
+    pairs = [("time", duration(found["seconds"]))]
     if found["judged_by"] == "amplitude" and all(one is None for row in found["used"] for one in row):
         pairs.insert(0, ("note", "nothing says what is allowed: give stresses a material, or a limit"))
     endless = {
@@ -75,8 +76,8 @@ def margin(found: Json) -> Iterator[Block]:
     allowed = [
         (
             one["name"], _ends(one, unit), one["row"] or "–",
-            "–" if one["at_hz"] is None else f"{one['at_hz']:.6g} Hz",
-            "–" if one["value"] is None else f"{one['value']:.6g} {found['unit']}",
+            "–" if one["at_hz"] is None else hertz(one['at_hz']),
+            "–" if one["value"] is None else quantity(one['value'], found['unit']),
         )
         for one in found["allowed"]
     ]  # fmt: skip
@@ -85,9 +86,9 @@ def margin(found: Json) -> Iterator[Block]:
     for key, title in (("stress", f"{what} [{found['unit']}]"), ("used", "share of what is allowed")):
         rows = [
             (
-                f"{each:.4g}",
+                number(each),
                 *(
-                    f"{one:.4g}"
+                    number(one)
                     if one is not None
                     else "infinite"
                     if key == "used" and (d, i) in endless
@@ -102,7 +103,7 @@ def margin(found: Json) -> Iterator[Block]:
 
 def _ends(one: Json, unit: str) -> str:
     if one["allowed"] is not None:
-        return f"{one['allowed']:.6g} {unit}"
+        return quantity(one["allowed"], unit)
     return {"below": "less than the range", "above": "more than the range"}.get(one["end"], "not known")
 
 
@@ -112,13 +113,13 @@ def _ridge(found: Json) -> Pairs:
     for name, at in (("first peak", 0), ("last peak", -1)):
         if found["peak"]:
             value, frequency = found["peak"][at], found["frequency"][at]
-            pairs.append((name, f"{units.length(value)} at {frequency:.6g} Hz"))
+            pairs.append((name, f"{length(value)} at {hertz(frequency)}"))
     for exchange in found["exchanges"]:
-        height = units.length(exchange["peak"])
+        height = length(exchange["peak"])
         pairs.append(("exchange", f"at {parameter(path, exchange['at'])}, both {height}"))
     if best["at"] is not None:
-        held = ", ".join(f"{peak['frequency']:.6g} Hz" for peak in best["active"])
-        height = units.length(best["peak"])
+        held = ", ".join(hertz(peak["frequency"]) for peak in best["active"])
+        height = length(best["peak"])
         pairs.append(("least peak", f"{height} at {path} = {parameter(path, best['at'])} ({held})"))
     return pairs
 

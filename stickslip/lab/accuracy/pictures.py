@@ -54,7 +54,7 @@ def accuracy_figure(study: Mapping[str, Any], *, ax: Into = None) -> Figure:
             axes, "processor time of a point by Newton's method [ms]", f"relative error of {WORDS[MAX_ABS]}"
         )
         axes.set_title(
-            f"{study['scene']} at {study['frequency_hz']:.6g} Hz: {units.length(study['reference'])};"
+            f"{study['scene']} at {units.hertz(study['frequency_hz'])}: {units.length(study['reference'])};"
             " the numbers are harmonics"
         )
         axes.margins(x=0.08, y=0.06)

@@ -21,13 +21,13 @@ def accuracy(found: Json) -> Iterator[Block]:
             str(row["harmonics"] or ""),
             row["evaluator"] if row["samples"] == 0 else f"{row['samples']} samples",
             units.length(row["max_abs"]),
-            f"{row['error'] / size:.1e}" if size > 0.0 else "",
-            f"{row['milliseconds']:.3g}",
+            units.number(row["error"] / size, 2) if size > 0.0 else "",
+            units.number(row["milliseconds"], 3),
             str(row["iterations"]),
         )
         for row in found["rows"]
     ]
-    title = f"{found['scene']} at {found['frequency_hz']:.6g} Hz: {units.length(size)}"
+    title = f"{found['scene']} at {units.hertz(found['frequency_hz'])}: {units.length(size)}"
     if found["reference_error"] is not None:
         by = found["reference_harmonics"]
         way = f"with {by} harmonics" if by else "exact"

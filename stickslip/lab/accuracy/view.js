@@ -1,6 +1,6 @@
 // The card of the page that shows what accuracy costs.
 
-import { number } from "../base/format.js";
+import { hertz, number } from "../base/format.js";
 import { chart } from "../charts/chart.js";
 import { view as viewOf } from "../views/view.js";
 
@@ -27,6 +27,6 @@ export const view = viewOf({
       marks: exact.filter((_, i) => i === 0 || i === exact.length - 1).map((r) => ({ x: r.milliseconds, y: share(r), text: `H = ${r.harmonics}`, colour: 1 })),
       describe: (x, y, i) => `H = ${exact[i].harmonics}: ${number(100 * y, 3)} % in ${number(x, 3)} ms`,
     });
-    view.say(`At ${number(result.frequency_hz, 6)} Hz, against ${result.reference_harmonics ? `${result.reference_harmonics} harmonics` : "the exact solution"}. ${result.status ?? ""}`);
+    view.say(`At ${hertz(result.frequency_hz)}, against ${result.reference_harmonics ? `${result.reference_harmonics} harmonics` : "the exact solution"}. ${result.status ?? ""}`);
   },
 });

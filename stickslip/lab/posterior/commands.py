@@ -11,13 +11,14 @@ from stickslip.lab.posterior.study import PosteriorStudy
 
 
 def _posterior(
-    name: str, data: list[str], column: list[str] | None, values: list[str] | None, plot: str | None,
-    out: str | None, uncertain: str | None, as_json: bool, **given: Any,
+    name: str, data: list[str], column: list[str] | None, values: list[str] | None,
+    without: list[str] | None, plot: str | None, out: str | None, uncertain: str | None, as_json: bool,
+    **given: Any,
 ) -> None:  # fmt: skip
     outputs = Outputs.asked(plot, out)
     problem = inputs.output_path("--uncertain", uncertain, (".toml",))
-    scene = inputs.scene(name, values)
-    answer = computed(_OF_POSTERIOR, scene, {"data": data, **_OF_POSTERIOR.read(given)}, column)
+    scene = inputs.scene(name, values, without)
+    answer = computed(_OF_POSTERIOR, scene, {"data": data, **_OF_POSTERIOR.read(given, scene)}, column)
     kept = getattr(answer.result, "uncertain", None)
     if problem is not None and kept:
         write_problem(problem, name, inputs.settings(values), kept)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from solver.results import units
 from solver.results.told import Block, ResultTable, Summary
 
 _HEADS = ("parameter", "mean", "± sd", "90 % interval")
@@ -40,7 +41,7 @@ def _model_choice(found: Mapping[str, Any]) -> Iterator[Block]:
         of = one["posterior"]
         rows.append((
             one["name"], _number(one["probability"], ".3g"), _number(one["probability_error"], ".1g"),
-            _evidence(of), "" if of["noise"] is None else f"{100.0 * of['noise']:.3g} %",
+            _evidence(of), "" if of["noise"] is None else f"{units.number(100.0 * of['noise'], 3)} %",
             "does not describe the data" if of["misfit"] else "",
         ))  # fmt: skip
     yield ResultTable("models", ("model", "probability", "± error", "ln evidence", "noise", ""), rows)
@@ -53,15 +54,17 @@ def _rows(marginals: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
             rows.append((one["name"], "not told", "", ""))
             continue
         low, high = one["interval"]
-        mean = f"{one['mean']:.6g} {one['unit']}".rstrip()
-        rows.append((one["name"], mean, f"{one['sd']:.2g}", f"{low:.6g} to {high:.6g}"))
+        mean = units.quantity(one["mean"], one["unit"])
+        rows.append(
+            (one["name"], mean, units.number(one["sd"], 2), f"{units.number(low)} to {units.number(high)}")
+        )
     return rows
 
 
 def _evidence(found: Mapping[str, Any]) -> str:
     if found["log_evidence"] is None:
         return "not known"
-    return f"{found['log_evidence']:.4g} ± {_number(found['log_evidence_error'], '.2g')}"
+    return f"{units.number(found['log_evidence'])} ± {_number(found['log_evidence_error'], '.2g')}"
 
 
 def _number(value: float | None, form: str) -> str:

@@ -19,7 +19,7 @@ def _torus_curve(found: Json) -> Iterator[Block]:
         note = "repeats" if found["repeats"][i] else "" if found["known"][i] else "not known well"
         rows.append((units.number(hertz), *sizes, note))
     heads = ("frequency [Hz]", "max|x|", "root mean square", "at the first", "at the second", "± error", "")
-    yield ResultTable(f"{found['scene']} with {units.number(found['second_hz'])} Hz", heads, rows)
+    yield ResultTable(f"{found['scene']} with {units.hertz(found['second_hz'])}", heads, rows)
     yield Summary("", [("time", units.duration(found["seconds"]))])
 
 
@@ -40,7 +40,10 @@ def quasi_periodic(found: Json) -> Iterator[Block]:
         ]
         if found["error_estimate"] is not None:
             pairs.append(
-                ("estimated error", f"{found['error_estimate'] / found['half_peak_to_peak']:.1e} of it")
+                (
+                    "estimated error",
+                    f"{units.number(found['error_estimate'] / found['half_peak_to_peak'], 2)} of it",
+                )
             )
         between = " and ".join(f"{p} : {q}" for p, q in found["turns"])
         pairs.append(("repeats after turns" if found["repeats"] else "between turns", between))

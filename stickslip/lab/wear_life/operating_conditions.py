@@ -13,6 +13,7 @@ from typing import Annotated
 
 import numpy as np
 
+from solver.results import units
 from solver.arrays import Real
 from solver.balance.balance import Balance, build, for_parameter
 from solver.balance.simplifications import Effects
@@ -135,7 +136,7 @@ class OperatingConditions:
             found = space.solve(TWO_PI * hertz)
         self.solved += 1
         if not found.converged:
-            raise LostError(f"At {hertz:g} Hz no response was found.")
+            raise LostError(f"At {units.hertz(hertz)} no response was found.")
         motion = PeriodicMotion(hertz=hertz, u=found.u, moves=False)
         self._known[hertz] = motion
         return balance, motion

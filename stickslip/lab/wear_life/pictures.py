@@ -22,26 +22,24 @@ def wear_life_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
     hours, amplitude = numbers(found["hours"]), numbers(found["amplitude"])
     measured, depths = Measured.of_result(found), np.array(found["depths"])
     length = measured.unit_for(float(amplitude.max()))
-    depth = units.length_unit(float(depths.max()))
+    depth = units.shown_unit(float(depths.max()))
     with style.styled():
         page, (response, loads, worn) = style.figure(10.5, 3.4, columns=3, into=ax)
-        response.plot(hours, amplitude * length.per_metre, color=style.BLUE)
+        response.plot(hours, amplitude * length.per_one, color=style.BLUE)
         for at in found["switches"]:
             response.axvline(at, color=style.GREY, linewidth=0.6)
         if found["limit"] is not None:
-            response.axhline(found["limit"] * length.per_metre, color=style.VERMILION, linewidth=0.8)
+            response.axhline(found["limit"] * length.per_one, color=style.VERMILION, linewidth=0.8)
         if found["hours_to_limit"] is not None:
             at = found["hours_to_limit"]
-            response.plot(
-                [at], [found["limit"] * length.per_metre], "o", color=style.VERMILION, markersize=4.0
-            )
-            response.set_title(f"limit after {units.number(at, 4)} h")
+            response.plot([at], [found["limit"] * length.per_one], "o", color=style.VERMILION, markersize=4.0)
+            response.set_title(f"limit after {units.quantity(at, 'h')}")
         else:
             response.set_title(found["scene"])
         rows = zip(found["contacts"], found["loads"], depths, strict=True)
         for name, load, deep in list(rows)[:_MOST_CONTACTS]:
             loads.plot(hours, numbers(load), label=name)
-            worn.plot(hours, deep * depth.per_metre)
+            worn.plot(hours, deep * depth.per_one)
         loads.legend()
         style.label(response, "running time [h]", measured.label("", length))
         style.label(loads, "running time [h]", "normal load [N]")

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BeforeValidator, WithJsonSchema
 
+from solver.results import units
 from optim.criteria.criterion import Criterion, CriterionContext, CriterionRow, Form, Judged, Key
 from optim.criteria.peak_criterion import COMPETES
 
@@ -69,12 +70,12 @@ def _rows(judged: Judged) -> list[CriterionRow]:
     course.follow()
     weight = judged.weight(WORN) * judged.case.weight
     if course.status is not WearLifeStatus.COMPLETED:
-        what = f"worn peak after {end:.4g} h"
+        what = f"worn peak after {units.quantity(end, 'h')}"
         return [judged.row(WORN, what, math.nan, None, bound=asked.most, weight=weight)]
     tops = course.maxima(asked.since, end)
     return [
         judged.row(
-            WORN, f"worn peak, {_when(top.hours, asked)} at {top.motion.hertz:.6g} Hz", top.amplitude,
+            WORN, f"worn peak, {_when(top.hours, asked)} at {units.hertz(top.motion.hertz)}", top.amplitude,
             top.gradient if judged.gradients else None, at_hz=top.motion.hertz, bound=asked.most,
             weight=weight,
         )

@@ -24,7 +24,7 @@ def test_words_name_the_least_peak_and_a_picture_is_written(
     assert picture.stat().st_size > 4000
     out, err = capsys.readouterr()
     assert "least peak" in out
-    assert "104.788 N" in out
+    assert "104.8 N" in out
     assert err == ""
 
 

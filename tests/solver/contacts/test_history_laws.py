@@ -255,7 +255,7 @@ def test_the_plan_says_how_it_is_followed() -> None:
     ("given", "words"),
     [
         ({**IWAN, "chi": -1.0}, "`chi` must be > -1, got -1.0"),
-        ({**DAHL, "limit": 0.0}, "`limit` must be > 0, got 0.0"),
+        ({**DAHL, "limit": 0.0}, "`limit` must be > 0 N, got 0.0"),
         ({**BOUC_WEN, "n": 0.5}, "`n` must be >= 1, got 0.5"),
         ({**TANH, "samples": 8}, "`samples` must be >= 32, got 8"),
     ],

@@ -36,7 +36,7 @@ def test_scenes_are_written_and_read_again():
 
 def test_mistakes_are_named():
     assert "did you mean `gap`?" in issues(law="gapp")["/contacts/0/law"]
-    assert "must be >= 0, got -1.0" in issues(**{**GAP, "k": -1.0})["/contacts/0/k"]
+    assert "must be >= 0 N/m, got -1.0" in issues(**{**GAP, "k": -1.0})["/contacts/0/k"]
     assert "a contact with the law `gap` needs it" in issues(law="gap", k=1.0)["/contacts/0/gap"]
     assert (
         "`kt` = 1.0 is not a key of a contact with the law `gap`" in issues(**GAP, kt=1.0)["/contacts/0/kt"]

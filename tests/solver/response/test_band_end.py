@@ -169,7 +169,7 @@ def test_a_design_without_a_resonance_is_not_certain() -> None:
     (warned,) = [words for words in found.warnings if "end of the band" in words]
     text = [value for block in found.blocks() for _, value in block.pairs]
     assert text.count(warned) == 1
-    assert "466.842 Hz with all contacts open or 583.884 Hz with all contacts stuck" in warned
+    assert "466.8 Hz with all contacts open or 583.9 Hz with all contacts stuck" in warned
     closed = optim.design(
         Scene.from_dict(blade((300.0, 900.0))), variables={"snubber.N0": (1.0, 1000.0)}, harmonics=3
     )

@@ -117,29 +117,29 @@ WRONG = [
     ("structure/sectors", 8, "/structure/sectors", "not a key of a lumped structure"),
     ("structure/masses", {}, "/structure/masses", "must not be empty"),
     ("structure/masses", [1.0], "/structure/masses", "must be a table"),
-    ("structure/masses/a", -1.0, "/structure/masses/a", "`a` must be > 0, got -1.0"),
+    ("structure/masses/a", -1.0, "/structure/masses/a", "`a` must be > 0 kg, got -1.0"),
     ("structure/masses/a", 0.0, "/structure/masses/a", "> 0"),
     ("structure/masses/a", {"m": 1.0, "nam": "x"}, "/structure/masses/a/nam", "did you mean `name`"),
     ("structure/masses/ground", 1.0, "/structure/masses/ground", "reserved"),
     ("structure/masses/c d", 1.0, "/structure/masses/c d", "letters, digits"),
-    ("structure/springs/0/k", -1.0, "/structure/springs/0/k", ">= 0, got -1.0"),
-    ("structure/springs/0/k", "5", "/structure/springs/0/k", "must be a number, got '5'"),
+    ("structure/springs/0/k", -1.0, "/structure/springs/0/k", ">= 0 N/m, got -1.0"),
+    ("structure/springs/0/k", "5", "/structure/springs/0/k", "must be a number without quotes, got '5'"),
     ("structure/springs/0/k", True, "/structure/springs/0/k", "must be a number"),
-    ("structure/springs/0/k", 1e16, "/structure/springs/0/k", "<= 1e+15"),
+    ("structure/springs/0/k", 1e16, "/structure/springs/0/k", "<= 1e15 N/m"),
     ("structure/springs/0/k", 10**400, "/structure/springs/0/k", "`k`"),
     ("structure/springs/0/c", math.nan, "/structure/springs/0/c", "finite"),
     ("structure/springs/0/between", ["a"], "/structure/springs/0/between", "too few entries"),
-    ("structure/springs/0/between", ["a", "b", "a"], "/structure/springs/0/between", "too many entries"),
+    ("structure/springs/0/between", ["a", "b", "a"], "/structure/springs/0/between", "2 entries at most"),
     ("structure/springs/0/between", ["a", "a"], "/structure/springs/0/between", "different ends"),
     ("structure/springs/0/between", ["a", "bb"], "/structure/springs/0/between/1", "did you mean `b`"),
     ("structure/springs/0/between", ["a", "b@next"], "/structure/springs/0/between/1", "cyclic"),
     ("structure/springs/0/name", "d1", "/structure/dampers/0/name", "taken"),
-    ("structure/dampers/0/c", -1, "/structure/dampers/0/c", ">= 0, got -1"),
+    ("structure/dampers/0/c", -1, "/structure/dampers/0/c", ">= 0 N s/m, got -1"),
     ("structure/dampers/0/name", "mb", "/structure/dampers/0/name", "taken"),
     ("contacts", {}, "/contacts", "must be a list"),
     ("contacts/0", 3, "/contacts/0", "`contacts[0]` must be a table, got 3"),
     ("contacts/0/mu", -0.1, "/contacts/0/mu", "`mu` must be >= 0, got -0.1"),
-    ("contacts/0/kt", 0, "/contacts/0/kt", "`kt` must be > 0, got 0"),
+    ("contacts/0/kt", 0, "/contacts/0/kt", "`kt` must be > 0 N/m, got 0"),
     ("contacts/0/N0", math.inf, "/contacts/0/N0", "finite"),
     ("contacts/0/NO", 1.0, "/contacts/0/NO", "not a key of a contact"),
     ("contacts/0/name", "right", "/contacts/1/name", "taken"),
@@ -250,7 +250,7 @@ def test_files_that_cannot_be_read(tmp_path: Path):
     assert "did you mean 'two-dof'" in message("two-dofs")
     assert "must be a name or a path, got 3" in message(3)
     assert "neither a shipped scene" in message("a\0b")
-    assert "readable file" in message(tmp_path)
+    assert "it is a folder" in message(tmp_path)
     assert "line 2" in message(file("a.toml", b'name = "x"\nstructure = 1 2\n'))
     assert "line 1 column 2" in message(file("a.json", b"{x}"))
     assert "`name` is given twice" in message(file("b.json", b'{"name": 1, "name": 2}'))

@@ -80,7 +80,7 @@ MISTAKES: dict[str, Change] = {
     "kind": lambda s: s["structure"].update(kind="lumpy"),
     "sectors of a lumped structure": lambda s: s["structure"].update(kind="lumped"),
     "negative mass": lambda s: s["structure"]["masses"].update(tip=-0.02),
-    "text for a number": lambda s: s["contacts"][0].update(kt="5.53e6 N/m"),
+    "text for a number": lambda s: s["contacts"][0].update(kt="5.53e6 N/s"),
     "negative friction": lambda s: s["contacts"][0].update(mu=-0.3),
     "no friction coefficient": lambda s: s["contacts"][0].pop("mu"),
     "one end": lambda s: s["contacts"][0].update(between=["tip"]),

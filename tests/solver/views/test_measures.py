@@ -12,7 +12,7 @@ from each import each
 import optim
 import solver
 from solver.results.known import HALF_PEAK_TO_PEAK, MAX_ABS, WORDS, Measured
-from solver.results.units import length_unit
+from solver.results.units import shown_unit
 from solver.scene.scene import Scene
 
 ROOT = Path(__file__).parents[3]
@@ -76,7 +76,7 @@ def test_a_recovered_sum_is_drawn_in_its_unit() -> None:
     stress = Measured(dof="fillet", unit="MPa")
     assert stress.label("amplitude", stress.unit_for(3e-4)) == "amplitude, max |fillet| [MPa]"
     plain = Measured(dof="tip")
-    assert plain.unit_for(3e-4) == length_unit(3e-4)
+    assert plain.unit_for(3e-4) == shown_unit(3e-4)
 
 
 def test_nobody_else_makes_such_a_name() -> None:

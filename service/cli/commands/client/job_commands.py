@@ -21,6 +21,7 @@ from service.errors import InputError
 from service.rendering.text import print_json, print_table, print_told, say, told
 from solver.results import units
 from solver.scene.parameter_paths import parameter
+from solver.scene.toml import found_scene
 
 if TYPE_CHECKING:
     from service.client.client import Client
@@ -86,7 +87,7 @@ def show_designs(found: Mapping[str, Any], *, as_json: bool) -> None:
                 for name, of in one["variables"].items()
             ),
             "" if one["peak"] is None else units.length(one["peak"]["value"]),
-            "" if one["band_hz"] is None else f"{units.number(one['band_hz'])} Hz",
+            "" if one["band_hz"] is None else units.hertz(one["band_hz"]),
             "yes" if one["reached"] else "no",
         )
         for one in found["items"]
@@ -179,7 +180,8 @@ def results(
 
 def scene_of(name: str) -> Any:
     """The scene for a body: a scene file goes with it, a name is looked up by the service."""
-    return scene_to_submit(name) if name.endswith(SCENE_FILES) else name
+    found = str(found_scene(name))
+    return scene_to_submit(found) if found.endswith(SCENE_FILES) else name
 
 
 def hand_in(client: Client, body: Mapping[str, Any], *, wait: bool, as_json: bool) -> None:
@@ -212,7 +214,7 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
             sweep.id,
             sweep.parameter,
             str(sweep.points),
-            "" if sweep.peak is None else f"{sweep.peak.value:.6g}",
+            "" if sweep.peak is None else units.number(sweep.peak.value),
         )
         for sweep in answer.sweeps
     ]

@@ -11,6 +11,7 @@ from service.cli.options import parameters as options
 from service.cli.options.inputs import amount, count
 from service.errors import InputError
 from service.rendering.text import print_json, print_table, say
+from solver.results import units
 
 if TYPE_CHECKING:
     from service.client.client import Client
@@ -126,7 +127,7 @@ def share(client: Client, run: options.Job, days: Days = None, as_json: options.
 def _word(value: Any) -> str:
     if value is None:
         return ""
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    return units.number(value) if isinstance(value, float) else str(value)
 
 
 Project = Annotated[str, typer.Argument(metavar="PROJECT", help="Id of a project.")]

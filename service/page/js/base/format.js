@@ -2,14 +2,14 @@
 
 import { el } from "./dom.js";
 
-const LENGTHS = [
-  [0.1, "m", 1],
-  [1e-4, "mm", 1e3],
-  [1e-7, "µm", 1e6],
-  [1e-10, "nm", 1e9],
-  // Below an atom's size only rounding is left: said in metres, with its power of ten.
-  [0, "m", 1],
-];
+// The prefixes of units by the least size that has them; below the last one only rounding is left: said in the
+// unit itself, with its power of ten. The same as `solver.results.units` has.
+const SMALL = [[1e-4, "m", 1e3], [1e-7, "µ", 1e6]];
+const USUAL = [[1e13, "", 1], [1e9, "G", 1e-9], [1e6, "M", 1e-6], [1e4, "k", 1e-3], [0.1, "", 1], ...SMALL];
+const PREFIXES = {
+  m: [[0.1, "", 1], ...SMALL, [1e-10, "n", 1e9]], s: [[1, "", 1], [1e-3, "m", 1e3], SMALL[1]],
+  g: [[100, "k", 1e-3], [0.1, "", 1], ...SMALL], Hz: [[1e4, "k", 1e-3]], "N": USUAL, "N/m": USUAL, "Pa": USUAL, "J": USUAL, "W": USUAL,
+};
 export const METRES = { "m": 1, "mm": 1e-3, "µm": 1e-6 };
 const UNITS = new Map([["frequency", "Hz"], ["amplitude", "N"], ["phase", "rad"]]);
 
@@ -26,26 +26,35 @@ export const number = (value, digits = 4) => {
   return String(Number(value.toPrecision(digits)));
 };
 
-export function lengthUnit(largest) {
+// The unit with the prefix in which a quantity is a number of few digits: lengths from 0.1 to 100.
+export function shownUnit(largest, unit = "m") {
   const size = Math.abs(largest);
-  if (!Number.isFinite(size) || size === 0) return { name: "m", perMetre: 1 };
-  const [, name, perMetre] = LENGTHS.find(([least]) => size >= least);
-  return { name, perMetre };
+  if (!Number.isFinite(size) || size === 0) return { name: unit, perMetre: 1 };
+  if (unit === "kg") return (({ name, perMetre }) => ({ name, perMetre: 1e3 * perMetre }))(shownUnit(1e3 * size, "g"));
+  const [, prefix, per] = PREFIXES[unit]?.find(([least]) => size >= least) ?? [0, "", 1];
+  return { name: prefix + unit, perMetre: per };
 }
 
-export const length = (metres) => {
-  if (metres === null || metres === undefined) return "–";
-  const unit = lengthUnit(metres);
-  return `${number(metres * unit.perMetre)} ${unit.name}`;
-};
+// A quantity with its unit, and its error beside it, if that is known.
+export function measured(value, unit, error = null, digits = 4) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  const { name, perMetre: per } = shownUnit(value, unit);
+  if (!Number.isFinite(error ?? NaN) || Math.abs(error) < 1e-6 * Math.abs(value)) return `${number(value * per, digits)} ${name}`.trim();
+  if (Math.abs(error) < 1e-3 * Math.abs(value)) return `${measured(value, unit, null, digits)} ± ${measured(error, unit, null, 2)}`;
+  return `${number(value * per, digits)} ± ${number(error * per, 2)} ${name}`.trim();
+}
+
+export const length = (metres) => measured(metres, "m");
+
+export const hertz = (value) => measured(value, "Hz");
 
 export const unitOf = (path) => UNITS.get(path) ?? (path.startsWith("structure.") ? "" : UNITS.get(path.split(".").pop()) ?? "");
 
 export const withUnit = (path) => (unitOf(path) ? `${path} [${unitOf(path)}]` : path);
 
-export const quantity = (path, value) => `${number(value, 5)} ${unitOf(path)}`.trim();
+export const quantity = (path, value) => measured(value, unitOf(path));
 
-export const seconds = (value) => (value < 1 ? `${number(value * 1e3, 3)} ms` : value < 100 ? `${number(value, 3)} s` : `${number(value / 60, 2)} min`);
+export const seconds = (value) => measured(value, "s", null, 3);
 
 // Of today the time alone, over 24 hours.
 export function when(text) {

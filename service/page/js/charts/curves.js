@@ -1,6 +1,6 @@
 // A response as a chart: its curve through its polished peak, stable and not, its band.
 
-import { largest, length, lengthUnit, number, times } from "../base/format.js";
+import { hertz, largest, length, number, shownUnit, times } from "../base/format.js";
 
 // The amplitudes of the points that are stable, and of those that are not with their neighbours; null elsewhere.
 function byStability({ amplitude, unstable }) {
@@ -33,7 +33,7 @@ export function throughPeak({ parameter, amplitude, peak, unstable }) {
 
 // A response as a chart: curve, peak, band. `more` are further curves.
 export function responseOf(answer, more = []) {
-  const scale = lengthUnit(answer.peak?.value ?? 1);
+  const scale = shownUnit(answer.peak?.value ?? 1);
   const up = (values) => values.map(times(scale.perMetre));
   const points = throughPeak(answer);
   const parts = byStability(points);
@@ -47,8 +47,8 @@ export function responseOf(answer, more = []) {
       ...more.map((line) => ({ ...line, y: up(line.y) })),
     ],
     bands: answer.band_intervals_hz ?? [],
-    marks: answer.peak ? [{ x: answer.peak.at, y: answer.peak.value * scale.perMetre, text: `${length(answer.peak.value)} at ${number(answer.peak.at, 5)} Hz` }] : [],
-    describe: (x, y) => `${number(x, 6)} Hz: ${number(y, 5)} ${scale.name}`,
+    marks: answer.peak ? [{ x: answer.peak.at, y: answer.peak.value * scale.perMetre, text: `${length(answer.peak.value)} at ${hertz(answer.peak.at)}` }] : [],
+    describe: (x, y) => `${hertz(x)}: ${number(y, 5)} ${scale.name}`,
   };
 }
 
@@ -61,6 +61,6 @@ export const known = (rows) => rows.flat().filter((value) => value !== null);
 export function scaled(rows, unit) {
   if (unit === "Pa") return { name: "MPa", factor: 1e-6 };
   if (unit !== "m") return { name: unit, factor: 1 };
-  const scale = lengthUnit(largest(known(rows)));
+  const scale = shownUnit(largest(known(rows)));
   return { name: scale.name, factor: scale.perMetre, unit: scale };
 }

@@ -1,7 +1,7 @@
 // The map of amplitude over two parameters: a canvas below, axes and lines in SVG above.
 
 import { el, show, svg } from "../base/dom.js";
-import { lengthUnit, number } from "../base/format.js";
+import { length, number, shownUnit } from "../base/format.js";
 import { bisector } from "../vendor/d3.js";
 import { saving } from "./chart.js";
 import { pathOf, placeIn, plane, shape, sized } from "./plane.js";
@@ -179,8 +179,7 @@ function cursor(self, column, row, read) {
   const point = pointOf(self);
   const [px, py] = [xs.at(point.x), ys.at(point.y)];
   show(self.mark, svg("path", { class: "map-cursor", d: `M${px} ${box.top}V${box.bottom}M${box.left} ${py}H${box.right}` }));
-  const unit = lengthUnit(point.value ?? 0);
-  const height = point.value === null ? "no solution" : `${number(point.value * unit.perMetre)} ${unit.name}`;
+  const height = point.value === null ? "no solution" : length(point.value);
   self.share(point.x);
   read.textContent = `${shown.x.name} ${number(point.x, 6)} · ${shown.y.name} ${number(point.y, 5)} · ${height}`;
 }
@@ -196,7 +195,7 @@ function keyed(self, event, read, onPick) {
 
 // The scale of colours as a strip with its ends.
 export function shadeStrip([low, high]) {
-  const unit = lengthUnit(high);
+  const unit = shownUnit(high);
   const strip = el("canvas", { width: 256, height: 1, "aria-hidden": "true", class: "strip" });
   const brush = strip.getContext("2d");
   const image = brush.createImageData(256, 1);

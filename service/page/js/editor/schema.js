@@ -57,7 +57,7 @@ function variantOf(node, row) {
 
 // The schema of one row of a section.
 function rowSchema(scene, path, row) {
-  if (path === "structure/masses") return resolved({ $ref: "#/$defs/_MassEntry" });
+  if (path === "structure/masses") return resolved({ $ref: "#/$defs/MassEntry" });
   const node = nodeOf(scene, path);
   const many = node?.type === "array" ? node : (node?.anyOf ?? []).find((each) => each.type === "array");
   return many ? variantOf(resolved(many.items), row) : resolved(node);

@@ -2,7 +2,7 @@
 // of a body: {node, read, fill, input or rows}.
 
 import { el, note, options, show } from "../base/dom.js";
-import { lengthUnit, METRES } from "../base/format.js";
+import { METRES, shownUnit } from "../base/format.js";
 import { boundsTold, listBody, listColumns, listRow, namesOfTable, rowsOf, rowsOfTable, tableBody, tableColumns } from "./rows.js";
 import { hintOf, readField, written } from "./fields.js";
 
@@ -73,7 +73,7 @@ export function fieldPart(id, field) {
   const unit = isLength ? el("select", { id: `${name}-unit`, "aria-label": `Unit of ${field.label}`, class: "unit" }, options(Object.keys(METRES), "mm"))
     : field.unit ? el("span", { class: "unit" }, field.unit) : null;
   const per = () => (isLength ? 1 / METRES[unit.value] : 1);
-  const sized = (metres) => { if (isLength && lengthUnit(metres).name in METRES) unit.value = lengthUnit(metres).name; };
+  const sized = (metres) => { if (isLength && shownUnit(metres).name in METRES) unit.value = shownUnit(metres).name; };
   const [key, inside] = field.at ?? [field.key];
   const about = [field.words, field.kind === "number" && field.ends && field.ends !== "above 0" && hintOf(field) !== field.ends ? `(${field.ends})` : ""].filter(Boolean).join(" ");
   return {

@@ -1,7 +1,7 @@
 // The fit over the data, and the tables that say how sure it is.
 
 import { el, numeric, scrolled, scrolledTable } from "../base/dom.js";
-import { largest, lengthUnit, number, quantity, times, valuesSaid } from "../base/format.js";
+import { hertz, largest, number, quantity, shownUnit, times, valuesSaid } from "../base/format.js";
 
 const COLOURS = 6;
 const SHAPES = ["circle", "square", "triangle", "diamond"];
@@ -27,12 +27,12 @@ function over(runs, x, y, of, factor) {
 export function responsesChart(all) {
   const runs = all.filter(({ kind }) => kind === "response");
   if (!runs.length) return null;
-  const unit = lengthUnit(Math.max(...runs.map(({ data }) => largest(data))));
+  const unit = shownUnit(Math.max(...runs.map(({ data }) => largest(data))));
   return {
     x: { name: "frequency [Hz]", pad: 0.02 },
     y: { name: `amplitude [${unit.name}]`, unit, zero: true, pad: 0.08 },
     series: over(runs, "fit", "data", (x) => x, unit.perMetre),
-    describe: (x, y) => `${number(x, 6)} Hz: ${number(y, 4)} ${unit.name} measured`,
+    describe: (x, y) => `${hertz(x)}: ${number(y, 4)} ${unit.name} measured`,
   };
 }
 
@@ -45,7 +45,7 @@ export function phasesChart(all) {
 export function loopsChart(all) {
   const runs = all.filter(({ kind }) => kind === "loop");
   if (!runs.length) return null;
-  const unit = lengthUnit(Math.max(...runs.map(({ x }) => largest(x))));
+  const unit = shownUnit(Math.max(...runs.map(({ x }) => largest(x))));
   return { x: { name: `motion [${unit.name}]`, unit, pad: 0.06 }, y: { name: "force [N]", pad: 0.06 }, series: over(runs, "fit", "data", (x) => x.map(times(unit.perMetre)), 1) };
 }
 

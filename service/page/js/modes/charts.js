@@ -1,6 +1,6 @@
 // A nonlinear mode as charts: frequency and damping over the amplitude, peaks, loops, shape.
 
-import { largest, length, lengthUnit, number, times } from "../base/format.js";
+import { hertz, largest, length, measured, number, shownUnit, times } from "../base/format.js";
 
 const LINEAR = ["stuck", "separated", "closed"];
 const GHOSTS = [7, 5, 4, 3];
@@ -8,7 +8,7 @@ const GHOSTS = [7, 5, 4, 3];
 // The amplitude as it is looked at: of the mode, or as the observed motion.
 export function amplitudeOf(result, over) {
   if (over === "modal") return { name: "modal amplitude a [√kg m]", x: result.amplitude, of: (point) => point.amplitude, unit: undefined };
-  const unit = lengthUnit(largest(result.max_abs));
+  const unit = shownUnit(largest(result.max_abs));
   return { name: `max |${result.dof}| [${unit.name}]`, unit, x: result.max_abs.map(times(unit.perMetre)), of: (point) => point.max_abs * unit.perMetre };
 }
 
@@ -22,7 +22,7 @@ export function statesAt({ contacts, states }, i) {
 }
 
 const describe = (result, i) =>
-  `a ${number(result.amplitude[i], 4)} √kg m · max |${result.dof}| ${length(result.max_abs[i])} · ${number(result.frequency[i], 6)} Hz · ζ ${number(100 * result.damping_ratio[i], 4)} % · ${statesAt(result, i)}`;
+  `a ${measured(result.amplitude[i], "√kg m")} · max |${result.dof}| ${length(result.max_abs[i])} · ${hertz(result.frequency[i])} · ζ ${number(100 * result.damping_ratio[i], 4)} % · ${statesAt(result, i)}`;
 
 function curveOf(result, key, over, pins, factor = 1) {
   const { name, unit, x } = amplitudeOf(result, over);
@@ -72,7 +72,7 @@ export function performanceChart({ performance, dof }, by) {
   const peaks = loads ? performance.peak_at_load : performance.peak;
   const exact = (performance.exact ?? []).filter(({ peak }) => peak !== null).map((one) => (loads ? { x: 1 / one.excitation, y: one.peak / one.excitation } : { x: one.excitation, y: one.peak }));
   const heights = [...peaks, ...exact.map(({ y }) => y)].filter((v) => v !== null && v > 0).sort((a, b) => a - b);
-  const unit = lengthUnit(heights[Math.floor(heights.length / 2)] ?? 1);
+  const unit = shownUnit(heights[Math.floor(heights.length / 2)] ?? 1);
   const up = times(unit.perMetre);
   const least = loads ? performance.least : null;
   return {
@@ -90,7 +90,7 @@ export function performanceChart({ performance, dof }, by) {
 
 export function loopChart({ motions }, at, contact) {
   const loop = motions.loops[contact];
-  const unit = lengthUnit(largest(loop.motion[at]));
+  const unit = shownUnit(largest(loop.motion[at]));
   return {
     x: { name: `motion of ${loop.contact} [${unit.name}]`, unit, pad: 0.06 },
     y: { name: "force [N]", pad: 0.08 },

@@ -3,7 +3,7 @@
 import { on, state } from "../base/state.js";
 import { button, byId, el, facts, note, show, titled } from "../base/dom.js";
 import { csvText, saveText } from "../base/exports.js";
-import { length, nearestIn, number, seconds } from "../base/format.js";
+import { hertz, length, measured, nearestIn, number, seconds } from "../base/format.js";
 import { chart } from "../charts/chart.js";
 import { asked, current, value } from "../scene/scenes.js";
 import { shapeCard } from "../shape/card.js";
@@ -120,7 +120,7 @@ function choose(at) {
   plots.shape.draw(shapeChart(result, there));
   const names = result.motions.loops.map((loop) => loop.contact);
   show(byId("modes-loop-more"),
-    el("p", { class: "note", role: "status" }, `At a = ${number(result.amplitude[shown], 4)} √kg m, max |${result.dof}| ${length(result.max_abs[shown])}: ${statesAt(result, shown)}. A click on a curve above shows another amplitude.`),
+    el("p", { class: "note", role: "status" }, `At a = ${measured(result.amplitude[shown], "√kg m")}, max |${result.dof}| ${length(result.max_abs[shown])}: ${statesAt(result, shown)}. A click on a curve above shows another amplitude.`),
     el("div", { class: "row" }, names.length > 1 ? names.map((name, i) => button(name, () => { contact = i; choose(point); }, { "aria-pressed": String(i === contact) })) : null));
 }
 
@@ -132,7 +132,7 @@ function offerShape(at, there) {
   const states = Object.fromEntries(result.contacts.map((name, i) => [name, result.states[at][i]]));
   const body = { scene, set, harmonics, motion: { dofs, real: real[there], imag: imag[there], frequency_hz: result.frequency[at], states } };
   if (result.nodal_diameter !== null) body.nodal_diameter = result.nodal_diameter;
-  space.offer(body, `mode ${result.mode} at a = ${number(result.amplitude[at], 3)} √kg m`);
+  space.offer(body, `mode ${result.mode} at a = ${measured(result.amplitude[at], "√kg m")}`);
 }
 
 function tools() {
@@ -164,9 +164,9 @@ function describe() {
   const exact = (performance?.exact ?? []).filter(({ peak }) => peak === null).length;
   modes.facts(facts([
     ["mode", `${result.mode}${result.nodal_diameter === null ? "" : `, nodal diameter ${result.nodal_diameter}`}, ${result.n_harmonics} harmonics`],
-    ["at small amplitudes", `${number(result.frequency[0], 6)} Hz, ζ ${number(100 * result.damping_ratio[0], 4)} %`],
-    ["most damping", `ζ ${number(100 * result.damping_ratio[best], 4)} % at ${number(result.frequency[best], 6)} Hz, max |${result.dof}| ${length(result.max_abs[best])}`],
-    ["estimated error", `${number(worst("frequency_error"), 2)} Hz, ζ ${number(100 * worst("damping_error"), 2)} %`],
+    ["at small amplitudes", `${hertz(result.frequency[0])}, ζ ${number(100 * result.damping_ratio[0], 4)} %`],
+    ["most damping", `ζ ${number(100 * result.damping_ratio[best], 4)} % at ${hertz(result.frequency[best])}, max |${result.dof}| ${length(result.max_abs[best])}`],
+    ["estimated error", `${hertz(worst("frequency_error"))}, ζ ${number(100 * worst("damping_error"), 2)} %`],
     ...(performance?.least ? [["least peak", `${length(performance.least.peak)} with the loads × ${number(performance.least.load, 4)}: of this mode alone, a whole response confirms it`]] : []),
     ...(exact ? [["not compared", `${exact} of ${performance.exact.length} whole responses did not reach the end of the band`]] : []),
     ...(flutter ? flutterFacts(flutter, result) : []),
@@ -177,8 +177,8 @@ const known = (error, told) => (error == null ? "not known" : told(error));
 
 function flutterFacts({ cycles, unsolved = [], most_damping: most, most_at: at, most_error: error }, result) {
   const rows = cycles.map((cycle) => [cycle.stable === null ? "cycle" : `${stabilityOf(cycle)} cycle`,
-    `${length(cycle.max_abs)} ± ${known(cycle.max_abs_error, length)} at ${number(cycle.frequency, 6)} Hz, a ${number(amplitudeOf(result, "modal").of(cycle), 4)} √kg m${cycle.stable === null ? `, the mode alone ${cycle.attracts ? "attracts" : "repels"}, stability not known` : ""}`]);
-  rows.push(...unsolved.map(([low, high]) => ["not solved", `a ${number(low, 4)} to ${number(high, 4)} √kg m: a cycle may be there`]));
+    `${length(cycle.max_abs)} ± ${known(cycle.max_abs_error, length)} at ${hertz(cycle.frequency)}, a ${measured(amplitudeOf(result, "modal").of(cycle), "√kg m")}${cycle.stable === null ? `, the mode alone ${cycle.attracts ? "attracts" : "repels"}, stability not known` : ""}`]);
+  rows.push(...unsolved.map(([low, high]) => ["not solved", `a ${number(low, 4)} to ${measured(high, "√kg m")}: a cycle may be there`]));
   if (!rows.length) rows.push(["limit cycles", "none between these amplitudes"]);
-  return [...(most === null ? [] : [["most that is held", `ζ_aero −${number(100 * most, 4)} % ± ${known(error, (value) => `${number(100 * value, 2)} %`)} at a ${number(at, 4)} √kg m`]]), ...rows];
+  return [...(most === null ? [] : [["most that is held", `ζ_aero −${number(100 * most, 4)} % ± ${known(error, (value) => `${number(100 * value, 2)} %`)} at a ${measured(at, "√kg m")}`]]), ...rows];
 }

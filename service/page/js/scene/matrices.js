@@ -4,7 +4,7 @@ import { Problem, post, request } from "../network/api.js";
 import { button, byId, details, el, facts, onFiles, onSubmit, say, show } from "../base/dom.js";
 import { edit } from "../editor/editor.js";
 import { on } from "../base/state.js";
-import { number } from "../base/format.js";
+import { hertz, measured, number } from "../base/format.js";
 import { matrixFiles } from "./files.js";
 import { joined, matrixForm } from "./matrix_form.js";
 
@@ -102,11 +102,11 @@ function report(found) {
   const rows = [
     ...found.matrices.map(({ name, rows: n, entries }) => [name, `${n} × ${n}, ${entries} entries`]),
     ["rows", labels ? `named: nodes ${labels.nodes[0]} to ${labels.nodes[1]}, ${labels.components.join(", ")}` : "not named by the files"],
-    ...(mass ? [["mass", `${number(mass.kg)} kg in ${mass.direction}, without what is held`]] : []),
+    ...(mass ? [["mass", `${measured(mass.kg, "kg")} in ${mass.direction}, without what is held`]] : []),
     ["first frequencies", hz ? `${hz.slice(0, 6).map((f) => number(f)).join(", ")} Hz, without contacts` : "known once the model is reduced"],
     ...(found.sets ? [["sets of the deck", found.sets.map(({ name, nodes }) => `${name} (${nodes} nodes)`).join(", ") || "none"]] : []),
-    ...(reduction ? [["reduced to", `${Object.keys(found.scene.structure.dofs).length} DOFs and ${reduction.modes} modes${reduction.diameters ? ` at each of ${reduction.diameters.length} nodal diameters` : ""} up to ${number(reduction.highest_hz)} Hz`],
-      ["good to", `${number(reduction.good_to_hz)} Hz: frequencies up to there are exact to 0.1 %; the harmonics that matter should lie below`]] : []),
+    ...(reduction ? [["reduced to", `${Object.keys(found.scene.structure.dofs).length} DOFs and ${reduction.modes} modes${reduction.diameters ? ` at each of ${reduction.diameters.length} nodal diameters` : ""} up to ${hertz(reduction.highest_hz)}`],
+      ["good to", `${hertz(reduction.good_to_hz)}: frequencies up to there are exact to 0.1 %; the harmonics that matter should lie below`]] : []),
   ];
   const notes = found.notes.length ? el("ul", { class: "issues", "aria-label": "What looks wrong" }, found.notes.map((note) => el("li", {}, note))) : null;
   show(byId("matrix-report"), notes, facts(rows));

@@ -1,7 +1,7 @@
 // The drawing of a scene: masses, springs, contacts with what they do.
 
 import { el, note, numeric, show, svg, table } from "../base/dom.js";
-import { number } from "../base/format.js";
+import { hertz, measured, number } from "../base/format.js";
 import { GROUND, chain, ownName, partsOf, ring } from "./layout.js";
 import { current, value } from "./scenes.js";
 import { drawSector } from "./sector.js";
@@ -76,7 +76,7 @@ export function contactTable(states, at) {
     }),
   ]);
   const heads = columns.map(({ symbol }) => numeric(symbol));
-  return table(["contact", "between", at ? `at ${number(at, 5)} Hz` : "state", ...(laws ? ["law"] : []), ...heads], rows, at ? `Contacts at ${number(at, 5)} Hz` : "Contacts");
+  return table(["contact", "between", at ? `at ${hertz(at)}` : "state", ...(laws ? ["law"] : []), ...heads], rows, at ? `Contacts at ${hertz(at)}` : "Contacts");
 }
 
 // The state of a joint, of several contacts the first; of a disk written out every sector j has its own.
@@ -176,7 +176,7 @@ function lumped(drawing, scene, parts, states, width) {
   if (!parts.matrices) drawing.append(svg("g", { transform: `rotate(90 ${ground.x} ${(low + high) / 2})` }, hatched(ground.x, (low + high) / 2, (high - low) / 2)));
   parts.springs.forEach((s) => {
     const [a, b] = [end(s.between[0], s.between[1], 0), end(s.between[1], s.between[0], 0)];
-    if (a && b) drawing.append(spring(a, b, 6, `${s.name ?? "spring"}: ${number(s.k)} N/m`));
+    if (a && b) drawing.append(spring(a, b, 6, `${s.name ?? "spring"}: ${measured(s.k, "N/m")}`));
   });
   const held = new Map();
   for (const contact of parts.contacts) {
@@ -239,7 +239,7 @@ function disk(drawing, scene, parts, states) {
   const reach = (between, j) => closed || j + 1 < shown || !between.some((name) => name.endsWith("@next"));
   for (const j of sectors) {
     for (const s of parts.springs) {
-      if (reach(s.between, j)) drawing.append(spring(end(s.between[0], j), end(s.between[1], j), 3.2, j ? null : `${s.name ?? "spring"}: ${number(s.k)} N/m`));
+      if (reach(s.between, j)) drawing.append(spring(end(s.between[0], j), end(s.between[1], j), 3.2, j ? null : `${s.name ?? "spring"}: ${measured(s.k, "N/m")}`));
     }
   }
   for (const j of sectors) {

@@ -3,7 +3,7 @@
 import { button as buttonOf, byId, el, note, options, say, show } from "../base/dom.js";
 import { on } from "../base/state.js";
 import { paperColour, saveBlob } from "../base/exports.js";
-import { lengthUnit, number } from "../base/format.js";
+import { hertz, measured, number } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 import { STATES } from "../scene/structure.js";
 import { stage } from "./stage.js";
@@ -117,12 +117,7 @@ function close(self) {
   self.stage = null;
 }
 
-const sizeOf = ({ unit, amplitude }) => {
-  const largest = Math.max(...amplitude.flat());
-  if (unit !== "m") return `${number(largest, 3)} ${unit}`;
-  const { name, perMetre } = lengthUnit(largest);
-  return `${number(largest * perMetre, 3)} ${name}`;
-};
+const sizeOf = ({ unit, amplitude }) => measured(Math.max(...amplitude.flat()), unit);
 
 const statesOf = ({ contacts }) => contacts.filter(({ states }) => states[0]).map(({ name, states }) => {
   const every = [...new Set(states)];
@@ -132,7 +127,7 @@ const statesOf = ({ contacts }) => contacts.filter(({ states }) => states[0]).ma
 function describe(self) {
   const { shape, parts, wish } = self;
   const wave = shape.nodal_diameter === null ? "" : `, nodal diameter ${shape.nodal_diameter}`;
-  const words = [`${number(shape.frequency_hz, 6)} Hz${wave}`, `largest ${sizeOf(shape)}`, ...statesOf(shape)];
+  const words = [`${hertz(shape.frequency_hz)}${wave}`, `largest ${sizeOf(shape)}`, ...statesOf(shape)];
   parts.canvas.setAttribute("aria-label", `${wish.words}: ${words.join("; ")}`);
   const { shown } = self.stage;
   const whole = shape.contacts.filter(({ states, motions }) => states[0] && !motions[0]).map(({ name }) => name);
@@ -229,6 +224,6 @@ export function startShape(bodyAt) {
   const card = shapeCard(byId("shape-view"), { id: "shape", file: "shape" });
   on("scene-left", card.leave);
   on("states", ({ at }) => {
-    if (at > 0) card.offer(bodyAt(at), `the shape at ${number(at, 6)} Hz`);
+    if (at > 0) card.offer(bodyAt(at), `the shape at ${hertz(at)}`);
   });
 }

@@ -3,7 +3,7 @@
 import { on, state } from "../base/state.js";
 import { byId, el, note, show } from "../base/dom.js";
 import { saveFrom } from "../base/exports.js";
-import { length, lengthUnit, number, quantity } from "../base/format.js";
+import { hertz, length, number, quantity, shownUnit } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 import { inUse, sameValues } from "../scene/inputs.js";
 import { givenByScene, variable } from "../scene/scenes.js";
@@ -89,11 +89,11 @@ const arrow = (was, is) => (was === null ? is : `${was} → ${is}`);
 
 function peakFigure({ peak }, was) {
   if (!peak) return ["Highest peak", "–", "", "answer-peak"];
-  if (!was?.peak) return ["Highest peak", length(peak.value), `at ${number(peak.at, 5)} Hz`, "answer-peak"];
-  const { name, perMetre } = lengthUnit(Math.max(was.peak.value, peak.value));
+  if (!was?.peak) return ["Highest peak", length(peak.value), `at ${hertz(peak.at)}`, "answer-peak"];
+  const { name, perMetre } = shownUnit(Math.max(was.peak.value, peak.value));
   const share = peak.value / was.peak.value - 1;
   const change = `${share > 0 ? "+" : "−"}${number(100 * Math.abs(share), 2)} %`;
-  return ["Highest peak", `${arrow(number(was.peak.value * perMetre), number(peak.value * perMetre))} ${name}`, `${change}, at ${number(peak.at, 5)} Hz${fewer(was)}`, "answer-peak"];
+  return ["Highest peak", `${arrow(number(was.peak.value * perMetre), number(peak.value * perMetre))} ${name}`, `${change}, at ${hertz(peak.at)}${fewer(was)}`, "answer-peak"];
 }
 
 const fewer = ({ kept }) => (kept && kept < (designed.request.harmonics ?? 11) ? `; before with ${kept} harmonics` : "");
@@ -121,11 +121,11 @@ function certificate({ reached, status, optimality, warnings = [], basins = [] }
 // In spite of what is not known: the worst case of the best nominal design, and of this one.
 function robustFigures({ aim, nominal, robust }) {
   const [was, is] = [nominal, robust].map((side) => side?.worst?.peak ?? null);
-  const { name, perMetre } = lengthUnit(Math.max(was ?? 0, is ?? 0));
+  const { name, perMetre } = shownUnit(Math.max(was ?? 0, is ?? 0));
   const text = (value) => (value === null ? null : number(value * perMetre));
   return [
     ["Worst peak", is === null ? "–" : `${arrow(text(was), text(is))} ${name}`, robust?.worst?.scenario?.words ? `with ${robust.worst.scenario.words}; before: the nominal design` : aim, "answer-peak"],
-    ["Peak, all nominal", robust?.peak ? length(robust.peak.value) : "–", robust?.peak ? `at ${number(robust.peak.at, 5)} Hz` : "", "answer-nominal"],
+    ["Peak, all nominal", robust?.peak ? length(robust.peak.value) : "–", robust?.peak ? `at ${hertz(robust.peak.at)}` : "", "answer-nominal"],
   ];
 }
 

@@ -2,7 +2,7 @@
 
 import { facts } from "../base/dom.js";
 import { tell } from "../base/state.js";
-import { length, notes, number, warnings } from "../base/format.js";
+import { hertz, length, notes, number, warnings } from "../base/format.js";
 import { chart } from "../charts/chart.js";
 import { view } from "./view.js";
 
@@ -29,11 +29,11 @@ export const campbell = view({
         natural(result, "open_hz", "all open", 4, low, high),
       ],
       bands: result.orders.flatMap((o) => o.exceeded_rpm),
-      describe: (x, y, i) => `order ${crossings[i].order} meets ${length(crossings[i].amplitude)} at ${number(x, 5)} /min, ${number(y, 5)} Hz`,
+      describe: (x, y, i) => `order ${crossings[i].order} meets ${length(crossings[i].amplitude)} at ${number(x, 5)} /min, ${hertz(y)}`,
     });
     campbell.say(`Shaded: speeds at which the amplitude is above ${result.limit === null ? "half power of the order's peak" : length(result.limit)}.`);
     campbell.facts(facts([
-      ...crossings.map((c) => [`order ${c.order}`, `${length(c.amplitude)} at ${number(c.speed_rpm, 5)} /min, ${number(c.frequency_hz, 5)} Hz`]),
+      ...crossings.map((c) => [`order ${c.order}`, `${length(c.amplitude)} at ${number(c.speed_rpm, 5)} /min, ${hertz(c.frequency_hz)}`]),
       ...notes({ notes: result.notes }), ...warnings(result.orders.map((o) => o.peak_certificate)),
     ]));
   },

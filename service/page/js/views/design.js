@@ -2,7 +2,7 @@
 
 import { on, state, tell } from "../base/state.js";
 import { bad, button, byId, el, details, facts, note, numeric, scrolledTable, show, titled } from "../base/dom.js";
-import { length, notes, number, quantity, seconds, valuesSaid } from "../base/format.js";
+import { hertz, length, measured, notes, number, quantity, seconds, valuesSaid } from "../base/format.js";
 import { Problem, patiently, post } from "../network/api.js";
 import { previewer } from "../network/previews.js";
 import { asked } from "../scene/scenes.js";
@@ -43,14 +43,13 @@ export const design = view({
     design.facts(
       facts([
         ...found,
-        ["highest peak", result.peak ? `${length(result.peak.value)} at ${number(result.peak.at, 6)} Hz` : "–"],
+        ["highest peak", result.peak ? `${measured(result.peak.value, "m", result.error_estimate)} at ${hertz(result.peak.at)}` : "–"],
         ...Object.entries(result.plateau ?? {}).map(([path, [low, high]]) => [`${path}, as good`, `${quantity(path, low)} to ${quantity(path, high)}`]),
         ...(result.chosen_by ? [["chosen by", result.chosen_by]] : []),
-        ...(typeof result.error_estimate === "number" ? [["estimated error", length(result.error_estimate)]] : []),
         ...(result.warnings ?? []).map((words) => ["warning", bad(words)]),
         ...notes({ notes: result.notes, warnings: result.warnings }),
-        ["resonance band", result.band_hz === null ? "–" : `${number(result.band_hz)} Hz above ${length(result.limit)}`],
-        ...furtherOf(result).map(({ quantity: name, value, unit, what }) => [name, `${unit === "m" ? length(value) : `${number(value)} ${unit}`}: ${what}`]),
+        ["resonance band", result.band_hz === null ? "–" : `${hertz(result.band_hz)} above ${length(result.limit)}`],
+        ...furtherOf(result).map(({ quantity: name, value, unit, what }) => [name, `${measured(value, unit)}: ${what}`]),
         ["held by", `${(result.active ?? []).join(", ") || "nothing"}${heldIn(result)}`],
         ...(result.certainty ? [["certain", result.certainty]] : []),
         ...(result.looked_at?.length ? [["looked at", `${result.looked_at.length} designs over the whole range`]] : []),
@@ -102,8 +101,6 @@ export function load(values, { scene, set = {} }) {
   // What was found comes last, as if it had been set last.
   return putAll({ ...Object.fromEntries(Object.entries(set).filter(([path]) => !(path in found))), ...found });
 }
-
-const measured = (value, unit) => (unit === "m" ? length(value) : `${number(value)} ${unit}`);
 
 const several = (rows) => new Set(rows.map((row) => row.case)).size > 1;
 
@@ -179,8 +176,8 @@ const percent = (share) => numeric(share === null ? "–" : `${share > 0 ? "+" :
 function drawSensitivities({ peaks, rows, left_out: without, band_hz: band, limit, n_harmonics: kept, status, reached }) {
   const host = byId("design-sensitivities");
   if (!reached || !rows.length) return show(host, note(`Sensitivities: ${status}`));
-  const heads = ["parameter", ...["value", ...peaks.map(({ at }) => `peak at ${number(at, 5)} Hz`), "band"].map(numeric)];
-  const lines = rows.map(({ path, value, unit, peaks_percent: each, band_percent: width }) => [path, numeric(`${number(value, 5)} ${unit}`.trim()), ...each.map(percent), percent(width)]);
+  const heads = ["parameter", ...["value", ...peaks.map(({ at }) => `peak at ${hertz(at)}`), "band"].map(numeric)];
+  const lines = rows.map(({ path, value, unit, peaks_percent: each, band_percent: width }) => [path, numeric(measured(value, unit)), ...each.map(percent), percent(width)]);
   const part = (some, name) => scrolledTable(name, heads, some);
   const of = [`For one per cent more of a parameter${band === null ? "" : `; the band is measured at ${length(limit)}`}.`, `${kept} harmonics.`,
     cases ? "Of the scene as it is set, without the load cases." : ""].filter(Boolean).join(" ");

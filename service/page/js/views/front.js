@@ -1,7 +1,7 @@
 // The Pareto front of peak against band; a click loads a design.
 
 import { button, byId, el, numeric, scrolledTable } from "../base/dom.js";
-import { length, lengthUnit, number, seconds, valuesSaid } from "../base/format.js";
+import { hertz, length, number, seconds, shownUnit, valuesSaid } from "../base/format.js";
 import { chart } from "../charts/chart.js";
 import { OF_THE_BAR } from "../scene/kinds.js";
 import { load } from "./design.js";
@@ -45,7 +45,7 @@ function take(at) {
 
 function draw() {
   const peaks = points.map((p) => p.peak);
-  const unit = lengthUnit(Math.max(...peaks));
+  const unit = shownUnit(Math.max(...peaks));
   const log = Math.max(...peaks) > FAR_APART * Math.min(...peaks);
   const limit = request.limit ?? null;
   front.plot.draw({
@@ -54,9 +54,9 @@ function draw() {
     series: [{ name: "front", x: points.map((p) => p.band_hz), y: points.map((p) => p.peak * unit.perMetre), colour: 1, shape: "circle", size: 4.5 }],
     limits: limit !== null && limit >= 0.5 * Math.min(...peaks) && limit <= 2 * Math.max(...peaks) ? [{ y: limit * unit.perMetre, name: "the band is measured here" }] : [],
     marks: chosen === null ? [] : [{ x: points[chosen].band_hz, y: points[chosen].peak * unit.perMetre, shape: "diamond", colour: 2, text: "loaded" }],
-    describe: (x, y, i) => `${valuesSaid(points[i].values)}: peak ${number(y)} ${unit.name}, band ${number(x)} Hz. Enter or a click loads it.`,
+    describe: (x, y, i) => `${valuesSaid(points[i].values)}: peak ${number(y)} ${unit.name}, band ${hertz(x)}. Enter or a click loads it.`,
   });
   front.facts(scrolledTable("Designs of the front", ["design", numeric("peak"), numeric("band"), ""], points.map(({ values, peak, band_hz: band }, i) => [
-    el(i === chosen ? "strong" : "span", {}, valuesSaid(values)), numeric(length(peak)), numeric(`${number(band)} Hz`),
+    el(i === chosen ? "strong" : "span", {}, valuesSaid(values)), numeric(length(peak)), numeric(`${hertz(band)}`),
     button(i === chosen ? "Loaded" : "Load", () => take(i), { "aria-label": `Load the design ${valuesSaid(values)}` })])));
 }

@@ -1,7 +1,7 @@
 // The interference diagram of a disk: natural frequencies over the nodal diameter, and the engine orders there.
 
 import { byId, details, el, note, numeric, scrolledTable } from "../base/dom.js";
-import { number } from "../base/format.js";
+import { hertz, number } from "../base/format.js";
 import { chart } from "../charts/chart.js";
 import { refusedFor } from "../scene/kinds.js";
 import { figurePart, formPart, statusPart, view } from "./view.js";
@@ -102,7 +102,7 @@ const way = ({ wave }) => (wave === "standing" ? "" : ` ${wave}`);
 
 function described(one, found) {
   const what = found.map((each) => (each.inside ? `meets family ${each.family}` : `${number(100 * each.margin, 3)} % from family ${each.family}`));
-  return `order ${one.order}: nodal diameter ${one.diameter}${way(one)}, ${number(one.frequency_hz, 5)} Hz, ${what.join(", ") || "meets none"}`;
+  return `order ${one.order}: nodal diameter ${one.diameter}${way(one)}, ${hertz(one.frequency_hz)}, ${what.join(", ") || "meets none"}`;
 }
 
 // Engine orders that meet a family, or are near one.

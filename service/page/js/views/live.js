@@ -3,7 +3,7 @@
 import { on, state, tell, write } from "../base/state.js";
 import { chart } from "../charts/chart.js";
 import { button, byId, el, options, show } from "../base/dom.js";
-import { length, number, quantity, unitOf } from "../base/format.js";
+import { hertz, length, number, quantity, unitOf } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 import { responseOf, throughPeak } from "../charts/curves.js";
 import { sameValues } from "../scene/inputs.js";
@@ -99,8 +99,8 @@ export function showResponse(result) {
 }
 
 const words = ({ peak, band_hz: band, status, peak_certificate: certificate }) =>
-  (peak ? `peak ${length(peak.value)} at ${number(peak.at, 5)} Hz` : status)
-  + (band === null ? "" : `, band ${number(band)} Hz`)
+  (peak ? `peak ${length(peak.value)} at ${hertz(peak.at)}` : status)
+  + (band === null ? "" : `, band ${hertz(band)}`)
   + (peak && certificate && !certificate.known ? `; ${certificate.reason}` : "");
 
 // What the sliders are set to: the response that follows them, or that of the study where it is of the same values.

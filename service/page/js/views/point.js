@@ -2,7 +2,7 @@
 
 import { on, state, tell, write } from "../base/state.js";
 import { button, byId, el, facts, say, show, titled } from "../base/dom.js";
-import { largest, length, lengthUnit, notes, number, percent, times } from "../base/format.js";
+import { hertz, largest, length, notes, number, percent, shownUnit, times } from "../base/format.js";
 import { chart } from "../charts/chart.js";
 import { resume, run } from "../network/jobs.js";
 import { previewer } from "../network/previews.js";
@@ -69,7 +69,7 @@ function go(frequency, again = false) {
 function arrived(answer) {
   found = answer;
   if (!answer.converged) return point.say(answer.status, true);
-  point.say(`${number(answer.frequency_hz, 6)} Hz: ${length(answer.max_abs)}, error about ${length(answer.error_estimate)}.`);
+  point.say(`${hertz(answer.frequency_hz)}: ${length(answer.max_abs)}, error about ${length(answer.error_estimate)}.`);
   const states = answer.period.contacts.map((c) => [c.name, c.shares ? `${c.state}: ${shares(c.shares)}` : c.state]);
   point.facts(
     facts([["max |x|", length(answer.max_abs)], ["half peak to peak", length(answer.half_peak_to_peak)], ["mean", length(answer.mean)], ...states, ...notes(answer)]),
@@ -118,7 +118,7 @@ function draw() {
 
 function drawHistory() {
   const { time, displacement } = found.period;
-  const unit = lengthUnit(largest(displacement));
+  const unit = shownUnit(largest(displacement));
   const [per, word] = time[time.length - 1] < 0.1 ? [1e3, "ms"] : [1, "s"];
   const line = (x, y) => ({ x: x.map((t) => t * per), y: y.map((v) => v * unit.perMetre) });
   const series = [{ name: "balance", ...line(time, displacement), colour: 1 }];
@@ -136,7 +136,7 @@ function drawLoop() {
   if (!contacts.length) return;
   chosen = Math.min(chosen, contacts.length - 1);
   const contact = contacts[chosen];
-  const unit = lengthUnit(largest(contact.slip));
+  const unit = shownUnit(largest(contact.slip));
   const up = times(unit.perMetre);
   const x = contact.slip.map(up);
   const pieces = contact.motion
@@ -161,7 +161,7 @@ function piece({ motion, force }, x, code, line) {
 
 function drawHarmonics() {
   const heights = found.harmonics.map((v) => (v > 0 ? v : null));
-  const unit = lengthUnit(largest(found.harmonics));
+  const unit = shownUnit(largest(found.harmonics));
   const least = 1e-6 * largest(found.harmonics);
   const shown = heights.map((v) => (v !== null && v > least ? v * unit.perMetre : null));
   plots.harmonics.draw({

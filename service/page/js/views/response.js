@@ -3,7 +3,7 @@
 import { state, tell } from "../base/state.js";
 import { button, el, facts } from "../base/dom.js";
 import { saveFrom, saveToml } from "../base/exports.js";
-import { betweenPoints, length, notes, number, seconds } from "../base/format.js";
+import { betweenPoints, hertz, length, measured, notes, seconds } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 import { OF_THE_BAR } from "../scene/kinds.js";
 import { chosenContact } from "../scene/scenes.js";
@@ -58,14 +58,13 @@ function redraw() {
 
 function describe() {
   const { result, sweep } = last;
-  const linearPeak = (name) => (limits?.[name]?.peak ? `${length(limits[name].peak.value)} at ${number(limits[name].peak.at, 5)} Hz` : "–");
+  const linearPeak = (name) => (limits?.[name]?.peak ? `${length(limits[name].peak.value)} at ${hertz(limits[name].peak.at)}` : "–");
   const rows = [
-    [result.peak && !result.peaks.some((peak) => peak.at === result.peak.at) ? "highest, at an end" : "highest peak", result.peak ? `${length(result.peak.value)} at ${number(result.peak.at, 6)} Hz` : "–"],
-    ["resonance band", result.band_hz === null ? "–" : `${number(result.band_hz)} Hz above ${length(result.band_limit)}`],
-    ["error estimate", result.error_estimate === null ? "–" : length(result.error_estimate)],
+    [result.peak && !result.peaks.some((peak) => peak.at === result.peak.at) ? "highest, at an end" : "highest peak", result.peak ? `${measured(result.peak.value, "m", result.error_estimate)} at ${hertz(result.peak.at)}` : "–"],
+    ["resonance band", result.band_hz === null ? "–" : `${hertz(result.band_hz)} above ${length(result.band_limit)}`],
     ...betweenPoints(result),
     ...notes(result),
-    ...(result.marks ?? []).map((mark) => [mark.kind.replaceAll("_", " "), `${length(mark.amplitude)} at ${number(mark.at, 6)} Hz`]),
+    ...(result.marks ?? []).map((mark) => [mark.kind.replaceAll("_", " "), `${length(mark.amplitude)} at ${hertz(mark.at)}`]),
     ["removed, linear", linearPeak("free")],
     ["stuck, linear", linearPeak("stuck")],
   ];

@@ -4,7 +4,7 @@ import { orNotice, request } from "../network/api.js";
 import { chart } from "../charts/chart.js";
 import { byId, details, note, numeric, scrolledTable, show } from "../base/dom.js";
 import { tell } from "../base/state.js";
-import { lengthUnit, number, unitOf, when } from "../base/format.js";
+import { number, shownUnit, unitOf, when } from "../base/format.js";
 import { kindOf } from "../scene/kinds.js";
 import { titleOf } from "./run_list.js";
 import { valuesIn } from "./runs.js";
@@ -53,7 +53,7 @@ function overlay(runs, summaries) {
   const drawn = summaries.map(({ curve, peak }, i) => ({ curve, peak, i })).filter(({ curve }) => curve);
   if (!drawn.length) return plot.clear("Neither run has stored a response over the frequency.");
   const names = headings(runs, summaries);
-  const unit = lengthUnit(Math.max(...drawn.flatMap(({ curve }) => curve.amplitude)));
+  const unit = shownUnit(Math.max(...drawn.flatMap(({ curve }) => curve.amplitude)));
   plot.draw({
     x: { name: "frequency [Hz]" }, y: { name: `amplitude [${unit.name}]`, unit, zero: true, pad: 0.1 },
     series: drawn.map(({ curve, i }) => ({ name: names[i], x: curve.frequency_hz, y: curve.amplitude.map((v) => v * unit.perMetre), colour: 1 + i, dash: i ? "dashed" : undefined })),
@@ -112,8 +112,8 @@ const isEqual = ({ a, b }) => JSON.stringify(a ?? null) === JSON.stringify(b ?? 
 const isNumber = (value) => typeof value === "number";
 
 function row({ name, unit, a, b }) {
-  const { name: told, perMetre } = unit === "m" ? lengthUnit(Math.max(...[a, b].filter(isNumber).map(Math.abs), 0)) : { name: unit, perMetre: 1 };
-  const said = (value) => (isNumber(value) ? `${number(value * perMetre, 5)} ${told}`.trim() : words(value));
+  const { name: told, perMetre } = shownUnit(Math.max(...[a, b].filter(isNumber).map(Math.abs), 0), unit);
+  const said = (value) => (isNumber(value) ? `${number(value * perMetre)} ${told}`.trim() : words(value));
   return [name, ...[a, b].map((value) => ({ text: said(value), title: typeof value === "string" ? value : undefined, number: true })), numeric(isNumber(a) && isNumber(b) ? change(a * perMetre, b * perMetre, told) : "")];
 }
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import solver
-from solver.scene.templates import TEMPLATES, new_scene, template_schema, template_tables
+from stickslip.lab.templates.templates import TEMPLATES, new_scene, template_schema, template_tables
 
 ASKED = {"frequency_hz": 417.0, "modal_mass": 0.083, "damping_ratio": 0.0037}
 DISK = {"blades": 30, "engine_order": 7}

@@ -11,8 +11,8 @@ import pytest
 
 import solver
 from service.cli import main
-from service.cli.demo import run
-from service.cli.demo_cases import CASES, REMOVED, STUCK, DemoCase, told_without_compiler
+from stickslip.lab.demo.demonstration import run
+from stickslip.lab.demo.demo_cases import CASES, REMOVED, STUCK, DemoCase, told_without_compiler
 from service.cli.failures import ShortfallError
 from service.client.embedded import EmbeddedService
 from service.settings.settings import load_settings

@@ -13,7 +13,7 @@ import numpy as np
 
 import solver
 from optim.views.tables.design import design
-from service.cli.demo_cases import CASES, REMOVED, STUCK, DemoCase
+from stickslip.lab.demo.demo_cases import CASES, REMOVED, STUCK, DemoCase
 from service.cli.failures import ShortfallError
 from service.cli.progress import Reporter, bars
 from service.client.embedded import EmbeddedService
