@@ -22,6 +22,7 @@ from solver.jit.way import WAY, Way
 if WAY is not Way.INTERPRETED:
     import numba
 if WAY is Way.COMPILED:
+    from solver.jit.borrowed import Borrowing
     from solver.jit.cache import KernelCache
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -45,6 +46,7 @@ def compiled(function: _Function, *, linked: bool = True) -> _Function:
         fastmath=_FASTMATH,
         no_cpython_wrapper=inner and kept_on_disk,
         no_cfunc_wrapper=kept_on_disk,
+        **({"pipeline_class": Borrowing} if kept_on_disk else {}),
     )(function)
     typed: _Function = kernel
     if not kept_on_disk:

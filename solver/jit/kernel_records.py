@@ -59,7 +59,9 @@ else:
             self.name: str = f"{type(self).__name__}.{zlib.crc32(long.encode()):08x}"
 
 
-def referenced(name: str, module: str, fields: Iterable[str], *seen_as: type) -> Callable[..., Any]:
+def referenced(
+    name: str, module: str, fields: Iterable[str], *seen_as: type, replaced: bool = False
+) -> Callable[..., Any]:
     """Return what makes a record by reference of its fields, for kernels and for Python.
 
     Parameters
@@ -67,11 +69,12 @@ def referenced(name: str, module: str, fields: Iterable[str], *seen_as: type) ->
     name : of the record, unlike those of all others.
     module : where it stands, which keeps Numba's type of it.
     seen_as : what Python sees of one besides.
+    replaced : whether kernels put other arrays into its fields.
     """
     fields = tuple(fields)
     if WAY is Way.INTERPRETED:
         return type(f"_{name}Reference", (*seen_as, Referenced), {"__module__": module, "_fields": fields})
-    kind = type(f"_{name}Type", (Structure,), {"__module__": module})
+    kind = type(f"_{name}Type", (Structure,), {"__module__": module, "replaced": replaced})
     setattr(sys.modules[module], kind.__name__, structref.register(kind))
     seen = type(f"_{name}Reference", (*seen_as, structref.StructRefProxy), {"__module__": module})
     structref.define_proxy(seen, kind, list(fields))

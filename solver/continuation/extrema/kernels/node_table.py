@@ -236,7 +236,7 @@ class Nodes:
     counts: Integer  # (8,)
 
 
-_new: Callable[..., Nodes] = referenced("Nodes", __name__, tuple(Nodes.__annotations__))
+_new: Callable[..., Nodes] = referenced("Nodes", __name__, tuple(Nodes.__annotations__), replaced=True)
 
 
 @compiled
