@@ -62,7 +62,7 @@ from solver.scene.scene import Scene
 # Unknowns from which a point is so dear that the largest step is longer, and how much: the survey adds what
 # it needs. Where fewer motions lead the others so is the first one, and of so many ports the arc grows by the
 # root of how many go along with each: so do its steps.
-_DEAR, _LONGER, _ALONG = 1000, 2.5, 48
+DEAR, _LONGER, _ALONG = 1000, 2.5, 48
 _MOST_FOLLOWED = 500  # points of a look at a resonance beside the branch
 _LOST = (
     BranchStatus.STALLED, BranchStatus.TURNED_BACK, BranchStatus.TOO_MANY_POINTS, BranchStatus.POWER_LOST,
@@ -239,7 +239,7 @@ def walk_branch(
     begun = clock() - (0.0 if resume is None else resume.seconds)
     balance, inside = workspace.balance, workspace.balance.parameter.inside
     pace = settings.pace
-    if balance.n_unknowns >= _DEAR:
+    if balance.n_unknowns >= DEAR:
         first = (_LONGER if is_spanned(workspace.system) else 1.0) * pace.first
         pace = replace(pace, first=first, largest=_LONGER * pace.largest)
     if is_spanned(workspace.system) and balance.n_ports >= _ALONG:

@@ -210,7 +210,8 @@ def _place(rows: Mapping[int, Real]) -> float:
 
 def _solve(tracker: Tracker, near: list[int], z: float) -> dict[int, Real]:
     """Return the solved rows at z of the lines that reach it, the highest first."""
-    rows = {index: tracker.exact(tracker.lines[index], z, fitting=False) for index in near}
+    lines = {index: tracker.lines[index] for index in near if not tracker.lines[index].held}
+    rows = {index: tracker.exact(line, z, fitting=False) for index, line in lines.items()}
     found = [(index, row) for index, row in rows.items() if row is not None]
     return dict(sorted(found, key=lambda item: -float(item[1][HEIGHT])))
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from solver.balance.simplifications import Effects
 from solver.continuation.branch import BranchStatus
-from solver.continuation.branches.sweep import with_error
+from solver.continuation.branches.sweep import DEAR, with_error
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, OMEGA, Z
 from solver.continuation.walk import Pace
 from solver.errors import SettingError, check_count
@@ -150,6 +150,7 @@ COMPETES = 0.6  # share of the highest peak of a sweep from which a peak is foll
 CLOSE = 0.97  # the same once the least highest peak is being closed in on
 RIVAL = 0.9  # the same for a peak of max x or −min x that the other of the two hides
 MOST_LOOKS = 40
+LOWER = 1e-3  # relative height by which a minimum of the lines must be below all sweeps to be swept early
 GAP = 2e-3  # share of the range below which a gap between lines is no gap
 WIDE = 1.3  # times the best peak: how high other basins may be that are looked for thoroughly
 COARSE = 0.08  # share of the range: sweeps closer than that do not look for other basins between them
@@ -188,7 +189,8 @@ def least_peak(
     parameter : path of the parameter, for example ``shroud.N0``.
     start, stop : its range in user units.
     harmonics : highest harmonic kept.
-    first : where the first sweep is made; the middle of the range if left out.
+    first : where the first sweep is made; if left out the middle of the range, and of a scene whose responses
+        are dear where the highest peak with one harmonic is least.
     basins : how many local minima are looked for. With more than one, a coarse stage follows the proof of the
         optimum, which stays as it is: a response with half the harmonics in the middle of every stretch that
         no sweep was made in and that the lines leave lower than 1.05 times the optimum (three at most), and
@@ -220,6 +222,10 @@ def least_peak(
             raise SettingError("first", first, f"must be from {min(start, stop)} to {max(start, stop)}")
         places.insert(0, z)
     try:
+        if first is None and tracker.balance.n_unknowns >= DEAR:
+            rough = Tracker(scene, parameter, start, stop, 1, effects, pace, Allowance(should_stop))
+            places[:0] = _roughly(rough, places)
+            tracker.before = rough.sweeps
         _begin(tracker, places, on_progress)
     except HaltedError as halt:
         best = halted(tracker, halt.status, begun)
@@ -241,6 +247,18 @@ def _begin(tracker: Tracker, places: list[float], on_progress: Callable[[float, 
         tracker.follow_rivals(look, RIVAL)
         if on_progress is not None:
             on_progress(_share_done(tracker), len(tracker.looks))
+
+
+def _roughly(tracker: Tracker, places: list[float]) -> list[float]:
+    """Return about where the highest line is least once the lines cover the range; nothing without lines."""
+    _begin(tracker, places, None)
+    while (gap := _gap(tracker)) is not None and len(tracker.lines) > 0 and len(tracker.looks) < MOST_LOOKS:
+        if not _narrowed(tracker, gap, CLOSE):
+            break
+    at = tracker.places()
+    heights = tracker.envelope(at)
+    known = np.flatnonzero(np.isfinite(heights))
+    return [float(at[known[np.argmin(heights[known])]])] if known.size else []
 
 
 def prove(
@@ -373,7 +391,7 @@ def _next_step(
     """
     gap = _gap(tracker)
     if gap is not None:
-        return (None if _filled(tracker, gap, share) else TrackStatus.GAPS), None
+        return (None if _narrowed(tracker, gap, share) else TrackStatus.GAPS), None
     if tighten(tracker, doubt):
         return None, None
     found = minima(tracker, doubt)
@@ -430,13 +448,30 @@ def _share_done(tracker: Tracker) -> float:
     return sweeps / (sweeps + 1.0)
 
 
-def _gap(tracker: Tracker) -> float | None:
-    """Return the middle of the widest stretch that no line covers; None if there is none to speak of."""
-    widest, middle, reached = GAP * tracker.scale.span, None, tracker.scale.low
-    for low, high in sorted((line.low, line.high) for line in tracker.lines):
+def _gap(tracker: Tracker) -> tuple[float, float] | None:
+    """Return the widest stretch that no line covers; None if there is none to speak of."""
+    widest, found, reached = GAP * tracker.scale.span, None, tracker.scale.low
+    end = tracker.scale.high
+    for low, high in [*sorted((line.low, line.high) for line in tracker.lines), (end, end)]:
         if low - reached > widest:
-            widest, middle = low - reached, 0.5 * (reached + low)
+            widest, found = low - reached, (reached, low)
         reached = max(reached, high)
-    if tracker.scale.high - reached > widest:
-        middle = 0.5 * (reached + tracker.scale.high)
-    return middle
+    return found
+
+
+def _narrowed(tracker: Tracker, gap: tuple[float, float], share: float) -> bool:
+    """Cover a part of a gap, or make it easier to cover; return whether either succeeded."""
+    return tracker.hold(*gap) or _bounded(tracker, share) or _filled(tracker, 0.5 * sum(gap), share)
+
+
+def _bounded(tracker: Tracker, share: float) -> bool:
+    """Sweep at a minimum of the lines that is lower than every sweep; return whether there is such a one.
+
+    What stands beside it, in a gap, then only has to be higher than that.
+    """
+    least = min((look.top for look in tracker.looks if look.seen), default=math.inf)
+    found = minima(tracker, 0.0, 1)[0]
+    if not found.bracketed or not found.height < least * (1.0 - LOWER) or seen(tracker, found.z) is not None:
+        return False
+    tracker.follow(tracker.look(found.z), share, found.rows, careful=True)
+    return True

@@ -16,7 +16,26 @@ import numpy as np
 
 from solver.balance.balance import Balance
 from solver.contacts.kernels.system import System
-from solver.continuation.extrema.kernels.amplitude_hessian import Summit
+from solver.continuation.extrema.kernels.amplitude_hessian import (
+    AMPLITUDE,
+    CORNER,
+    CURVE,
+    DA_DP,
+    DRIFT,
+    RATE,
+    SIGN,
+    TAU,
+    G,
+    Summit,
+    balance_at,
+    choose_extremum,
+    find_extremum,
+    observe_at,
+    slopes_at,
+    solve_responses,
+    summit_numbers,
+    summit_step,
+)
 from solver.continuation.extrema.kernels.peak_continuation import (
     COLUMNS,
     DHEIGHT,
@@ -28,8 +47,13 @@ from solver.continuation.extrema.kernels.peak_continuation import (
     Ridge,
     Z,
     begin_track,
+    between_rows,
+    record,
+    step_error,
     step_track,
+    value_of,
 )
+from solver.continuation.extrema.kernels.peak_newton import ACCEPTED
 from solver.jit import fourier
 from solver.jit.fourier import Integer, Real
 
@@ -61,6 +85,9 @@ class Line:
     sign: Annotated[float, "1 for a peak of max x, −1 for one of −min x."]
     fixed: Annotated[bool, "The amplitude at an end of the band, not a stationary peak."]
     ends: Annotated[tuple[LineEnd, LineEnd], "Why it ends below and above."]
+    held: Annotated[bool, "One amplitude on the flank of a peak, which is higher: see `HeldAmplitude`."] = (
+        False
+    )
 
     @property
     def low(self) -> float:
@@ -236,7 +263,7 @@ class FollowedPeak:
         self._system, self._summit, self._ridge, nt = system, summit, ridge, seed.u.size
         self._forward, self._smooth = math.copysign(1.0, ridge.stop - ridge.start), False
         self.found = np.zeros((MOST_ROWS, COLUMNS)), np.zeros((MOST_ROWS, nt)), np.zeros((MOST_ROWS, nt))
-        begun = begin_track(system, ridge, seed.u, seed.omega, seed.place, seed.sign, summit, *self.found)
+        begun = self._begun(seed)
         self.count = 1 if begun else 0
         self.end = LineEnd.TOO_LONG if begun else LineEnd.NOT_FOUND
         if begun and ridge.start == ridge.stop:
@@ -247,15 +274,25 @@ class FollowedPeak:
         """Whether it has arrived, or was not found at all."""
         return self.end is not LineEnd.TOO_LONG
 
+    def _begun(self, seed: Seed) -> bool:
+        """Write the first row; return whether it was found."""
+        start = seed.u, seed.omega, seed.place, seed.sign
+        return bool(begin_track(self._system, self._ridge, *start, self._summit, *self.found))
+
+    def _step(self, z: float) -> tuple[float, int, bool]:
+        """Write the next row, as `step_track`."""
+        found: tuple[float, int, bool] = step_track(
+            self._system, self._ridge, z, self.count, self._smooth, self._summit, *self.found
+        )
+        return found
+
     def tried(self, size: float) -> tuple[int | None, float]:
         """Try a step of z; the point is the number of rows with it."""
         ridge, at = self._ridge, float(self.found[0][self.count - 1, Z])
         z = at + self._forward * size
         last = (z - ridge.stop) * self._forward >= 0.0 or abs(z - ridge.stop) < 0.1 * ridge.smallest_step
         z = ridge.stop if last else z
-        error, iterations, self._outside = step_track(
-            self._system, ridge, z, self.count, self._smooth, self._summit, *self.found
-        )
+        error, iterations, self._outside = self._step(z)
         self._smooth = error <= 1.0
         if not self._smooth:
             return None, 0.5 * abs(z - at)
@@ -271,3 +308,66 @@ class FollowedPeak:
         """Say why it ends: where no short step leads on nothing does."""
         self.end = LineEnd.LEFT_BAND if self._outside else LineEnd.VANISHED
         return None, 0.0
+
+
+_MOST_TURNS, _FAR, _SETTLED = 8, 5e-3, 1e-2
+"""Newton steps, share of the frequency that one may move it by, and residual from which one does."""
+
+
+class HeldAmplitude(FollowedPeak):
+    """A solution of one amplitude on the flank of a peak: over the parameter that peak is at least as high.
+
+    Beside a fold Newton's method on da/dω = 0 finds a peak from close by alone, and its line ends soon. The
+    flank is smooth there; no second derivatives are needed, and rows are far apart.
+    """
+
+    def __init__(self, system: System, summit: Summit, ridge: Ridge, seed: Seed, within: float) -> None:
+        self._level, self._within, self.count = seed.height, within, 0
+        super().__init__(system, summit, ridge, seed)
+
+    def _begun(self, seed: Seed) -> bool:
+        summit_numbers(self._summit)[SIGN] = seed.sign
+        return self._solved(self._ridge.start, seed.u.copy(), seed.omega, seed.place) is not None
+
+    def _step(self, z: float) -> tuple[float, int, bool]:
+        rows, solutions, tangents = self.found
+        here, last = rows[self.count - 1], self.count - 1
+        length, u = z - here[Z], solutions[last] + (z - here[Z]) * tangents[last]
+        omega = float(here[OMEGA] + length * here[DOMEGA])
+        if self._smooth and last and abs(length) < 3.0 * abs(here[Z] - rows[last - 1, Z]):
+            two = slice(last - 1, last + 1)
+            omega = between_rows(*rows[two], *solutions[two], *tangents[two], z, u)
+        steps = self._solved(z, u, omega, float(here[PLACE]))
+        if steps is None:
+            return math.inf, _MOST_TURNS, False
+        return float(step_error(self._ridge, here, rows[self.count])), steps, False
+
+    def _solved(self, z: float, u: Real, omega: float, tau: float) -> int | None:
+        """Write the row at z from a guess; return how many Newton steps that took, None if it failed."""
+        system, ridge, at, place = self._system, self._ridge, self._summit, self.count
+        numbers, (p, by_z) = summit_numbers(at), value_of(z, ridge.logarithmic)
+        still, moved = np.empty_like(u), np.empty_like(u)
+        rows, solutions, tangents = (part[place] for part in self.found)
+        numbers[CURVE] = numbers[CORNER] = numbers[RATE] = 0.0
+        for step in range(_MOST_TURNS):
+            norm = balance_at(system, u, omega, p, at) if ridge.low <= omega <= ridge.high else math.nan
+            if not math.isfinite(norm) or not solve_responses(system, at):
+                break
+            observe_at(system, at)
+            if numbers[SIGN] == 0.0:
+                choose_extremum(system, at)
+                tau = float(numbers[TAU])
+            if not find_extremum(system, at, tau) or not slopes_at(system, at) or numbers[G] == 0.0:
+                break
+            tau, missing = float(numbers[TAU]), self._level - float(numbers[AMPLITUDE])
+            if norm <= ACCEPTED and abs(missing) <= self._within * self._level:
+                numbers[DRIFT] = -numbers[DA_DP] / numbers[G]
+                record(ridge, u, omega, z, at, rows, solutions, tangents)
+                return step
+            move = missing / float(numbers[G]) if norm <= _SETTLED else 0.0
+            move = min(max(move, -_FAR * omega), _FAR * omega)
+            for drift, tangent in ((0.0, still), (move / by_z, moved)):
+                numbers[DRIFT] = drift
+                record(ridge, u, omega, z, at, rows, solutions, tangent)
+            u, omega = u - summit_step(at) + (moved - still), omega + move
+        return None

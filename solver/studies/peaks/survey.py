@@ -264,6 +264,7 @@ class Looking(ABC):
         self._counting: Counting = all_peaks
         self._parts: list[Self] = []  # of the range
         self._lent = 0  # looks taken over from the whole range
+        self.before = 0  # responses that told where to begin
 
     @property
     @abstractmethod
@@ -298,7 +299,7 @@ class Looking(ABC):
     @property
     def sweeps(self) -> int:
         """How many responses were computed, those with fewer harmonics included."""
-        mine = len(self.looks) - self._lent + len(self.glances)
+        mine = self.before + len(self.looks) - self._lent + len(self.glances)
         return mine + sum(part.sweeps for part in self._parts)
 
     @property

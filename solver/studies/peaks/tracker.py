@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from solver.balance.contact_hessian import check_measure, check_no_line, second_numbers
+from solver.balance.kernels.output import MAX_ABS
 from solver.balance.simplifications import Effects
 from solver.contacts.kernels.system import System, by_reference
 from solver.contacts.laws.contact_law import without_second
@@ -48,6 +49,7 @@ from solver.studies.peaks.peak_lines import (
     MOST_ROWS,
     BandEndCrossing,
     FollowedPeak,
+    HeldAmplitude,
     Line,
     LineEnd,
     Seed,
@@ -68,6 +70,8 @@ CAREFUL = 3e-4  # share of the range: first step where lines are close
 AGAIN = 8  # times the peaks of one sweep are followed at most
 ENDING = 0.1  # of the first step: as short as steps become before a line ends
 EXACTLY = 1e-6  # relative distance within which a peak is one that was solved at the same place
+# What an amplitude that is held lies above what is enough by: share of what the peak does, and at most.
+ABOVE, MOST_ABOVE, LEAST_ABOVE = 0.25, 0.02, 1e-4
 
 
 def check_laws(scene: Scene) -> None:
@@ -96,6 +100,8 @@ class Tracker(Looking):
         summit_seconds(self._summit)[:] = second_numbers(self.balance.scene)
         self._crossings: list[BandEndCrossing] = []
         self._asked_at: Counter[float] = Counter()
+        self._exact: dict[tuple[int, float, bool], tuple[Line, Real]] = {}  # by a line that is kept with it
+        self._held: set[tuple[float, float, float]] = set()  # z, end of the range and amplitude asked for
 
     @property
     def enough(self) -> float:
@@ -167,6 +173,53 @@ class Tracker(Looking):
             )
         return len(self.lines) > before
 
+    def hold(self, low: float, high: float) -> bool:
+        """Cover a stretch by amplitudes that are high enough, held from the sweeps nearest to its ends.
+
+        Returns
+        -------
+        Whether there is a new line that reaches into it.
+        """
+        before, enough = len(self.lines), self.enough
+        if math.isinf(enough):
+            return False
+        seen = sorted((look for look in self.looks if look.seen), key=lambda look: look.z)
+        below = [(look, self.scale.high) for look in seen if look.z <= 0.5 * (low + high)][-1:]
+        above = [(look, self.scale.low) for look in seen if look.z > 0.5 * (low + high)][:1]
+        for look, end in below + above:
+            more = ABOVE * (look.top / enough - 1.0)
+            if more > LEAST_ABOVE and (look.z, end, enough) not in self._held:
+                self._held.add((look.z, end, enough))
+                self._hold(look, end, enough, min(more, MOST_ABOVE))
+        return any(line.low < high and line.high > low for line in self.lines[before:])
+
+    def _hold(self, look: Look, end: float, enough: float, more: float) -> None:
+        """Add the line of an amplitude held on the broader flank of the highest peak of a sweep."""
+        height, found = enough * (1.0 + more), look.branch.measures[:, MAX_ABS]
+        solutions, top = look.branch.solutions, int(np.argmax(found))
+        lower = np.flatnonzero(found < height)
+        flanks = [*lower[lower < top][-1:], *lower[lower > top][:1]]
+        if not flanks:
+            return
+        at = max(flanks, key=lambda row: abs(solutions[row, -1] - solutions[top, -1]))
+        inner = at + (1 if at < top else -1)
+        share = (height - found[at]) / (found[inner] - found[at])
+        guess = (1.0 - share) * solutions[at] + share * solutions[inner]
+        u, omega = fitted(guess[:-1].copy(), look.branch.balance.system.ks, self.balance), float(guess[-1])
+        seed = Seed(z=look.z, omega=omega, u=u, sign=0.0, place=0.0, fixed=False, height=height)
+        ridge = self._ridge(look.z, end, fixed=False)
+        why, rows, solutions, tangents, sign = self._walked(
+            HeldAmplitude(self._system, self._summit, ridge, seed, 0.25 * more)
+        )
+        if len(rows) > 1:
+            way, ends = (1, (LineEnd.NOT_FOUND, why)) if end > look.z else (-1, (why, LineEnd.NOT_FOUND))
+            self.lines.append(
+                Line(
+                    rows=rows[::way], solutions=solutions[::way], tangents=tangents[::way], sign=sign,
+                    fixed=False, ends=ends, held=True,
+                )
+            )  # fmt: skip
+
     def _seed_of(self, z: float, rival: Rival, ks: Integer) -> Seed:
         """Return the seed of a peak that is known as near as the points of a walk are."""
         u = fitted(rival.solution, ks, self.balance)
@@ -206,8 +259,14 @@ class Tracker(Looking):
             return exact_row
         if not line.low < z < line.high:
             return None
-        place = self.solved(line, z, fitting=fitting)
-        return None if place is None else place[0]
+        # A minimum is looked for again behind the sweep made at it, along the same way.
+        known = self._exact.get((id(line), z, fitting))
+        if known is None:
+            place = self.solved(line, z, fitting=fitting)
+            if place is None:
+                return None
+            known = self._exact[id(line), z, fitting] = line, place[0]
+        return known[1]
 
     def solved(self, line: Line, z: float, *, fitting: bool = True) -> Place | None:
         """Return row, solution and tangent of a line between two rows, None if not found; raises as `check`.
@@ -331,7 +390,10 @@ class Tracker(Looking):
         """Follow a peak one way; return why it ended, its rows, solutions, tangents and its sign."""
         self.check()
         ridge = self._ridge(seed.z, stop, fixed=seed.fixed)
-        peak = FollowedPeak(self._system, self._summit, ridge, seed)
+        return self._walked(FollowedPeak(self._system, self._summit, ridge, seed))
+
+    def _walked(self, peak: FollowedPeak) -> tuple[LineEnd, Real, Real, Real, float]:
+        """Follow as far as it goes, and return the same."""
         for count in walk(peak, self._steps):
             self.check()
             if count == MOST_ROWS:
@@ -365,7 +427,7 @@ def tighten(tracker: Tracker, doubt: float) -> bool:
         return False
     least, new = float(heights.min()), False
     for index, line in enumerate(tracker.lines):
-        matters = _matters(tracker, line, least, doubt)
+        matters = [] if line.held else _matters(tracker, line, least, doubt)
         if any(matters):
             tracker.lines[index] = _with_more(tracker, line, matters, least)
             new = True
