@@ -33,6 +33,8 @@ _COUNTED = re.compile(
 _WAY = re.compile(r"closed form|# samples|exact(?=  )")  # which of them pays, the clock decides
 _DURATION = re.compile(r"# (?:µs|ms|s|min)\b")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?")
+# Its unit is that of its size, which rounding decides.
+_ERROR = re.compile(rf"(± |estimated error  ){_NUMBER.pattern}(?: [nµm]?m\b)?")
 
 
 def asked(*words: str) -> tuple[int, str, str]:
@@ -72,7 +74,7 @@ def plain(text: str) -> str:
     lines = []
     for line in text.splitlines():
         line = re.sub(r" {2,}", "  ", line.rstrip())
-        line = re.sub(rf"± {_NUMBER.pattern}", "± #", line)
+        line = _ERROR.sub(r"\1#", line)
         told = _DURATION.sub("# s", _NUMBER.sub("#", line)) if _COUNTED.search(line) else line
         lines.append(_WAY.sub("way", told).lstrip("* ") if _WAY.search(told) else told)
     return "\n".join(line for line, _ in groupby(lines))

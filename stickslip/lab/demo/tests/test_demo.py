@@ -70,7 +70,7 @@ def test_where_nothing_is_compiled_the_first_optimum_comes_interpreted_and_once(
 
 def test_an_early_answer_is_that_of_the_command(capfd: pytest.CaptureFixture[str]) -> None:
     assert told_without_compiler(SMALL) == 1
-    assert re.search(r"damper\.N0 +104\.788 N", capfd.readouterr().out)
+    assert re.search(r"damper\.N0 +104\.8 N", capfd.readouterr().out)
     with pytest.raises(ShortfallError, match="nowhere"):
         told_without_compiler(replace(SMALL, scene="nowhere"))
 
