@@ -155,13 +155,9 @@ def write_engine(url: str, connections: int = CONNECTIONS, seconds: float = BUSY
     if not is_sqlite(url):
         return postgresql.service_engine(url, connections, seconds)
     engine = create_engine(
-        url,
-        pool_size=1,
-        max_overflow=0,
-        pool_timeout=seconds,
-        json_serializer=strict_json.stored,
+        url, pool_size=1, max_overflow=0, pool_timeout=seconds, json_serializer=strict_json.stored,
         connect_args={"timeout": seconds},
-    )
+    )  # fmt: skip
     event.listen(engine, "connect", _on_connect(read_only=False, foreign_keys=True, seconds=seconds))
     event.listen(engine, "begin", _begin_with("BEGIN IMMEDIATE", seconds))
     return engine

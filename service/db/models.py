@@ -138,17 +138,13 @@ class Job(TableBase):
     trace: Mapped[str | None] = mapped_column(String(64))
 
     __table_args__ = (
-        Index(None, "state", "owner", "priority", "id"),
-        Index(None, "spec_hash", "state", "owner"),
-        Index(None, "kind", "id"),
-        Index(None, "scene_name", "id"),
-        Index(None, "result_of"),
-        Index(None, "owner", "id"),
-        Index(None, "owner", "stored_bytes"),
+        Index(None, "state", "owner", "priority", "id"), Index(None, "spec_hash", "state", "owner"),
+        Index(None, "kind", "id"), Index(None, "scene_name", "id"), Index(None, "result_of"),
+        Index(None, "owner", "id"), Index(None, "owner", "stored_bytes"),
         UniqueConstraint("owner", "idempotency_key"),
         CheckConstraint("attempt >= 0 AND max_attempts >= 1", name="attempts"),
         CheckConstraint("(state = 'running') = (lease_owner IS NOT NULL)", name="lease"),
-    )
+    )  # fmt: skip
 
 
 class JobResult(TableBase):
@@ -264,12 +260,9 @@ class Result(TableBase):
     created: Mapped[datetime]
 
     __table_args__ = (
-        Index(None, "job_id", "of"),
-        Index(None, "of", "number"),
-        Index(None, "of", "owner", "number"),
-        Index(None, "of", "scene_name", "number"),
-        Index(None, "of", "scene_hash", "number"),
-    )
+        Index(None, "job_id", "of"), Index(None, "of", "number"), Index(None, "of", "owner", "number"),
+        Index(None, "of", "scene_name", "number"), Index(None, "of", "scene_hash", "number"),
+    )  # fmt: skip
 
 
 class Quantity(TableBase):

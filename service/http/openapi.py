@@ -273,10 +273,6 @@ def _example(name: str) -> dict[str, Any]:
     error, detail, issues = _ERRORS[name]
     status, slug, title = STATUS[error]
     return {
-        "type": f"urn:stickslip:problem:{slug}",
-        "title": title,
-        "status": status,
-        "detail": detail,
-        "instance": "/v1/jobs/01a2",
-        "errors": issues,
-    }
+        "type": f"urn:stickslip:problem:{slug}", "title": title, "status": status, "detail": detail,
+        "instance": "/v1/jobs/01a2", "errors": issues,
+    }  # fmt: skip

@@ -196,17 +196,11 @@ def _config(app: FastAPI | _Opening, settings: Settings) -> uvicorn.Config:
         log.warning("the system's limit of open files leaves room for %d connections", room)
         connections.most = room
     return uvicorn.Config(
-        app,
-        http=cast(type[asyncio.Protocol], connections.protocol),
-        log_config=None,
-        access_log=False,
-        lifespan="on",
-        timeout_graceful_shutdown=max(1, round(settings.shutdown_seconds)),
-        server_header=False,
-        h11_max_incomplete_event_size=_HEADER_BYTES,
-        proxy_headers=bool(settings.trusted_proxies),
-        forwarded_allow_ips=list(settings.trusted_proxies),
-    )
+        app, http=cast(type[asyncio.Protocol], connections.protocol), log_config=None, access_log=False,
+        lifespan="on", timeout_graceful_shutdown=max(1, round(settings.shutdown_seconds)),
+        server_header=False, h11_max_incomplete_event_size=_HEADER_BYTES,
+        proxy_headers=bool(settings.trusted_proxies), forwarded_allow_ips=list(settings.trusted_proxies),
+    )  # fmt: skip
 
 
 def _begin_the_rest(app: FastAPI) -> None:

@@ -243,22 +243,13 @@ class Service:
                 kind.resolve, request, body, source, work=work, memory=memory, version=SOLVER_VERSION
             )
         new = NewJob(
-            kind=kind.name,
-            request=dict(body),
-            spec=found.spec,
-            spec_hash=found.spec_hash,
-            request_hash=found.request_hash,
-            max_attempts=self.settings.max_attempts,
-            scene_name=found.scene_name,
-            scene_hash=found.scene_hash,
-            priority=request.priority,
-            fresh=request.fresh,
-            idempotency_key=idempotency_key,
-            owner=caller.owner,
-            seconds_limit=seconds,
+            kind=kind.name, request=dict(body), spec=found.spec, spec_hash=found.spec_hash,
+            request_hash=found.request_hash, max_attempts=self.settings.max_attempts,
+            scene_name=found.scene_name, scene_hash=found.scene_hash, priority=request.priority,
+            fresh=request.fresh, idempotency_key=idempotency_key, owner=caller.owner, seconds_limit=seconds,
             trace=traces.current(),
             words=RunWords(**{name: getattr(request, name) for name in ABOUT_THE_RUN}),
-        )
+        )  # fmt: skip
         waiting = None if caller.key_id is None else share(caller, self.settings, "waiting")
         row, inserted = self.jobs.submit(new, self.settings.queue_limit, waiting)
         self.waiters.progress(row.id, row.progress, row.points)

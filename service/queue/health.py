@@ -133,19 +133,11 @@ def _health(service: Service, trouble: list[str], counts: dict[str, int], versio
         workers.trouble if workers.ready else None,
     ]
     return Health(
-        ready=not trouble,
-        starting=_starting(service),
-        trouble=trouble,
-        notes=[note for note in notes if note is not None],
-        version=SOLVER_VERSION,
-        database=service.database.backend,
-        database_version=version,
-        revision=revisions.head_revision(),
-        workers=workers.workers,
-        workers_ready=workers.ready,
-        workers_busy=workers.busy,
-        jobs=counts,
-    )
+        ready=not trouble, starting=_starting(service), trouble=trouble,
+        notes=[note for note in notes if note is not None], version=SOLVER_VERSION,
+        database=service.database.backend, database_version=version, revision=revisions.head_revision(),
+        workers=workers.workers, workers_ready=workers.ready, workers_busy=workers.busy, jobs=counts,
+    )  # fmt: skip
 
 
 def readiness(service: Service) -> Readiness:

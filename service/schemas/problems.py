@@ -75,13 +75,9 @@ def problem(
 ) -> JSONResponse:
     """A problem document about a request."""
     body: dict[str, Any] = {
-        "type": f"urn:stickslip:problem:{slug}",
-        "title": title,
-        "status": status,
-        "detail": detail,
-        "instance": request.url.path,
-        "errors": issues or [],
-    }
+        "type": f"urn:stickslip:problem:{slug}", "title": title, "status": status, "detail": detail,
+        "instance": request.url.path, "errors": issues or [],
+    }  # fmt: skip
     # For the audit line; the outermost layer reads it from the same request.
     request.state.problem = (slug, detail)
     return JSONResponse(body, status_code=status, headers=headers, media_type=MEDIA_TYPE)

@@ -157,15 +157,11 @@ def _whole(value: object) -> int | None:
 
 
 _PEAKS = (
-    ("robust.worst.peak", "robust.peak.at"),
-    ("peak.value", "peak.at"),
-    ("peak.peak", "peak.at"),
-    ("optimum.value", "optimum.at"),
-    ("optimum.peak", "optimum.at"),
-    ("ridge.optimum.value", "ridge.optimum.at"),
-    ("ridge.optimum.peak", "ridge.optimum.at"),
+    ("robust.worst.peak", "robust.peak.at"), ("peak.value", "peak.at"), ("peak.peak", "peak.at"),
+    ("optimum.value", "optimum.at"), ("optimum.peak", "optimum.at"),
+    ("ridge.optimum.value", "ridge.optimum.at"), ("ridge.optimum.peak", "ridge.optimum.at"),
     ("points.peak", "points.at"),
-)
+)  # fmt: skip
 """Where results have their peak, and the place of it; that of a robust design is the worst one."""
 
 

@@ -102,12 +102,9 @@ class JsonFormatter(logging.Formatter):
         """The line of a record."""
         time = datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds")
         line: dict[str, object] = {
-            "time": time.replace("+00:00", "Z"),
-            "level": record.levelname,
-            "logger": record.name,
-            "message": record.getMessage(),
-            **_FIELDS.get(),
-        }
+            "time": time.replace("+00:00", "Z"), "level": record.levelname, "logger": record.name,
+            "message": record.getMessage(), **_FIELDS.get(),
+        }  # fmt: skip
         if record.exc_info:
             line["exception"] = self.formatException(record.exc_info)
         told = {name: masked(value) if isinstance(value, str) else value for name, value in line.items()}

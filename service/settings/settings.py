@@ -424,13 +424,10 @@ class Settings(ClientLimits):
     def pace(self) -> Pace:
         """How often workers tell what."""
         return Pace(
-            progress_seconds=self.progress_seconds,
-            checkpoint_seconds=self.checkpoint_seconds,
-            checkpoint_bytes=self.checkpoint_bytes,
-            log_level=self.log_level,
-            log_format=self.log_format,
+            progress_seconds=self.progress_seconds, checkpoint_seconds=self.checkpoint_seconds,
+            checkpoint_bytes=self.checkpoint_bytes, log_level=self.log_level, log_format=self.log_format,
             traces=self.traces,
-        )
+        )  # fmt: skip
 
     @field_validator("database")
     @classmethod

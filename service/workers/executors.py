@@ -149,13 +149,9 @@ def executor_of(settings: Settings, registry: Registry) -> Executor:
     limits = ProcessLimits(memory_bytes=settings.worker_memory_bytes or None)
     if settings.executor == "local" or settings.dask_scheduler is None:
         return LocalExecutor(
-            registry.runs(),
-            registry.warm_up,
-            workers=settings.workers,
-            grace_seconds=settings.grace_seconds,
-            pace=settings.pace,
-            limits=limits,
-        )
+            registry.runs(), registry.warm_up, workers=settings.workers,
+            grace_seconds=settings.grace_seconds, pace=settings.pace, limits=limits,
+        )  # fmt: skip
     try:
         made: Executor = from_lab("dask.dask_executor:of_settings")(
             settings, settings.dask_scheduler, registry, limits

@@ -5,12 +5,6 @@ from service.db.repositories.owned import SceneRepository, UploadRepository
 from service.db.repositories.result_repository import ResultRepository
 
 __all__ = [
-    "Attempt",
-    "JobRepository",
-    "JobRow",
-    "NewJob",
-    "RecoveredJobs",
-    "ResultRepository",
-    "SceneRepository",
+    "Attempt", "JobRepository", "JobRow", "NewJob", "RecoveredJobs", "ResultRepository", "SceneRepository",
     "UploadRepository",
-]
+]  # fmt: skip

@@ -316,10 +316,6 @@ REPORT = _guarded().values(
     lease_until=bindparam("until"),
 )
 SUCCEED = _guarded(_C.cancel_requested.is_(False)).values(
-    state=JobState.SUCCESSFUL,
-    finished=bindparam("ended"),
-    stored_bytes=_C.stored_bytes + bindparam("more"),
-    progress=1.0,
-    lease_owner=None,
-    lease_until=None,
-)
+    state=JobState.SUCCESSFUL, finished=bindparam("ended"),
+    stored_bytes=_C.stored_bytes + bindparam("more"), progress=1.0, lease_owner=None, lease_until=None,
+)  # fmt: skip

@@ -303,14 +303,9 @@ class JobRepository:
         """Give an unfinished job back to the queue, with its checkpoint, without costing it an attempt."""
         with self._db.writing() as connection:
             return change_owned(
-                connection,
-                attempt,
-                state=JobState.ACCEPTED,
-                attempt=attempt.attempt - 1,
-                started=None,
-                **as_far_as_kept(),
-                **FREE,
-            )
+                connection, attempt, state=JobState.ACCEPTED, attempt=attempt.attempt - 1, started=None,
+                **as_far_as_kept(), **FREE,
+            )  # fmt: skip
 
     def dismiss(self, attempt: Attempt) -> bool:
         """The running job was stopped because its cancel was asked for."""

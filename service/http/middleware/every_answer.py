@@ -148,13 +148,9 @@ def _audit(scope: Scope, state: dict[str, Any], status: int) -> None:
         return
     slug, detail = state.get("problem", ("refused", ""))
     line = {
-        "time": datetime.now(UTC).isoformat(timespec="milliseconds"),
-        "address": address_of(scope),
-        "key": state.get("key_id"),
-        "method": scope["method"][:_LONGEST_METHOD],
-        "path": logs.masked(scope["path"][:_LONGEST]),
-        "status": status,
-        "reason": "of-another" if status == _NOT_FOUND else slug,
-        "detail": logs.masked(detail[:_LONGEST]),
-    }
+        "time": datetime.now(UTC).isoformat(timespec="milliseconds"), "address": address_of(scope),
+        "key": state.get("key_id"), "method": scope["method"][:_LONGEST_METHOD],
+        "path": logs.masked(scope["path"][:_LONGEST]), "status": status,
+        "reason": "of-another" if status == _NOT_FOUND else slug, "detail": logs.masked(detail[:_LONGEST]),
+    }  # fmt: skip
     _audit_log.warning("%s", json.dumps(line))

@@ -57,15 +57,12 @@ def about_section(about: Mapping[str, Any], now: datetime) -> str:
     """
     computed = about.get("computed")
     rows = [
-        ("project", about.get("project", "")),
-        ("run", about.get("name", "")),
-        ("author", about.get("author") or "not named"),
-        ("tags", ", ".join(about.get("tags", ()))),
+        ("project", about.get("project", "")), ("run", about.get("name", "")),
+        ("author", about.get("author") or "not named"), ("tags", ", ".join(about.get("tags", ()))),
         ("computed", "" if computed is None else _when(datetime.fromisoformat(computed))),
-        ("report made", _when(now)),
-        ("notes of the project", about.get("project_notes", "")),
+        ("report made", _when(now)), ("notes of the project", about.get("project_notes", "")),
         ("notes", about.get("notes", "")),
-    ]
+    ]  # fmt: skip
     return pairs([(name, words) for name, words in rows if words])
 
 
@@ -97,14 +94,9 @@ def shared_page(run: SharedRun, found: Sequence[Block], sweeps: Sequence[SweepAn
     ended = "" if run.finished is None else f"{run.finished:%Y-%m-%d %H:%M %Z}"
     error = (run.error or {}).get("detail", "")
     about = [
-        ("study", run.kind),
-        ("scene", run.scene or ""),
-        ("state", run.status),
-        ("reason", error),
-        ("ended", ended),
-        ("tags", ", ".join(run.tags)),
-        ("notes", run.notes),
-    ]
+        ("study", run.kind), ("scene", run.scene or ""), ("state", run.status), ("reason", error),
+        ("ended", ended), ("tags", ", ".join(run.tags)), ("notes", run.notes),
+    ]  # fmt: skip
     parts = [f"<h1>{escape(title)}</h1>", pairs([(name, words) for name, words in about if words])]
     parts += ["<h2>What came out</h2>"] if found else []
     for block in found:

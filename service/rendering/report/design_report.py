@@ -68,15 +68,11 @@ def design_report(given: Designed) -> str:
         title_section(given, f"Damper of {given.scene.name}", chosen["status"]),
         optimum_section(given, {"optimum": chosen["optimum"]}),
         f"<h2>Before and after{escape(case.where)}</h2>{branch_table(lines)}",
-        response_section(scene, lines, words),
-        *_holds(given, chosen),
-        _sensitivities(given, after),
-        *_trade_off(given.result),
-        motion_section(lines[-1].branch),
-        scene_section(given.scene),
+        response_section(scene, lines, words), *_holds(given, chosen), _sensitivities(given, after),
+        *_trade_off(given.result), motion_section(lines[-1].branch), scene_section(given.scene),
         plan_section(after, given.harmonics),
         again_section(given, "pareto" if _is_front(given.result) else "design"),
-    ]
+    ]  # fmt: skip
     return page(f"Damper of {given.scene.name}", "\n".join(parts))
 
 
@@ -161,16 +157,11 @@ def robust_report(given: Designed) -> str:
     parts = [
         title_section(given, title, found["status"]),
         optimum_section(given, {f"{name} optimum": side["values"] for name, side in _sides(found)}),
-        _uncertain(found),
-        _over_the_uncertainty(found),
-        f"<h2>Responses</h2>{branch_table(lines)}",
-        response_section(scene, [*linear, *lines], words),
-        _robust_holds(found),
-        motion_section(shown.branch, f"At the peak of the {shown.name}"),
-        scene_section(given.scene),
-        plan_section(after, given.harmonics),
-        again_section(given, "design"),
-    ]
+        _uncertain(found), _over_the_uncertainty(found), f"<h2>Responses</h2>{branch_table(lines)}",
+        response_section(scene, [*linear, *lines], words), _robust_holds(found),
+        motion_section(shown.branch, f"At the peak of the {shown.name}"), scene_section(given.scene),
+        plan_section(after, given.harmonics), again_section(given, "design"),
+    ]  # fmt: skip
     return page(title, "\n".join(parts))
 
 
@@ -252,16 +243,11 @@ def identification_report(given: Designed) -> str:
     scene, found = given.scene, given.result
     name = f"Parameters of {scene.name} from measurements"
     parts = [
-        title_section(given, name, found["status"]),
-        _estimates(scene, found),
-        *_fit(found),
-        *_correlations(found),
-        f"<h2>How sure it is</h2>{pairs(told_pairs(found))}",
-        *_next(found),
-        scene_section(scene),
-        plan_section(scene.with_values(found["values"]), found["n_harmonics"]),
+        title_section(given, name, found["status"]), _estimates(scene, found), *_fit(found),
+        *_correlations(found), f"<h2>How sure it is</h2>{pairs(told_pairs(found))}", *_next(found),
+        scene_section(scene), plan_section(scene.with_values(found["values"]), found["n_harmonics"]),
         _again(scene, found),
-    ]
+    ]  # fmt: skip
     return page(name, "\n".join(parts))
 
 
