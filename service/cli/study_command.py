@@ -108,7 +108,7 @@ class Keys:
     @classmethod
     def of(cls, study: type[Study], *but: str) -> Keys:
         """Return them, without some that the command takes otherwise."""
-        options_ = {one.name: one for one in key_options(study.as_kind(), None)}
+        options_ = {one.name: one for one in key_options(study.as_kind(), None, free=True)}
         made = {name: options_[name] for name in study.own_keys() if name not in but}
         flags = {word: one.flag for name, one in made.items() for word in (name, one.key)}
         return cls(study, made, {**flags, "path": flags.get("parameter", "--set")})
@@ -171,7 +171,7 @@ def command_of(study: type[Study]) -> Callable[..., None]:
     ) -> None:  # fmt: skip
         outputs = Outputs.asked(plot, out)
         scene = inputs.scene(name, values, without)
-        asked = keys.read(given, scene)
+        asked = study.completed(scene, keys.read(given, scene))
         prepare(lambda: cost(study.NAME, scene, asked))
         if wrong := study.model_construct(**asked).issues(scene):
             raise refused(wrong, keys.flags)

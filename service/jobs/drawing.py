@@ -26,16 +26,10 @@ def response_of(sweep: StoredCurve, measured: Measured) -> Response:
     values, amplitude, unstable = with_peak(values, amplitude, peak, unstable)
     limit = sweep.limit
     return Response(
-        scene=sweep.scene,
-        parameter=sweep.parameter,
-        values=values,
-        amplitude=amplitude,
-        measured=measured,
-        peak=peak,
-        limit=limit,
-        intervals=() if limit is None else above(values, amplitude, limit),
+        scene=sweep.scene, parameter=sweep.parameter, values=values, amplitude=amplitude, measured=measured,
+        peak=peak, limit=limit, intervals=() if limit is None else above(values, amplitude, limit),
         unstable=unstable,
-    )
+    )  # fmt: skip
 
 
 def result_figure(

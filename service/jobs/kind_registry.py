@@ -173,12 +173,9 @@ class JobRequest(BaseModel):
         default=0, strict=True, ge=-100, le=100, description="Of one's own jobs, higher ones run first."
     )
     max_seconds: float | None = Field(
-        default=None,
-        strict=True,
-        ge=0.01,
-        le=1e7,
+        default=None, strict=True, ge=0.01, le=1e7,
         description="Longest time an attempt may take [s]; at most, and if left out, that of the service.",
-    )
+    )  # fmt: skip
     # What is said of the run is no part of what is computed: a dump of the model leaves it out.
     project: str | None = Field(
         default=None, max_length=36, exclude=True, description="Id of the project the run belongs to."

@@ -249,14 +249,11 @@ ModelT = TypeVar("ModelT", bound=BaseModel)
 _SHOWN = 80  # characters of what was given
 _WRITTEN_OUT = 1e-3  # the least bound whose zeros are written
 _MESSAGES = {
-    "extra_forbidden": "is not a known key",
-    "missing": "is missing",
-    "finite_number": "must be a finite number",
-    "bool_type": "must be true or false",
-    "int_type": "must be a whole number",
-    "float_type": "must be a number",
+    "extra_forbidden": "is not a known key", "missing": "is missing",
+    "finite_number": "must be a finite number", "bool_type": "must be true or false",
+    "int_type": "must be a whole number", "float_type": "must be a number",
     "string_type": "must be a string",
-}
+}  # fmt: skip
 
 
 def validated(model: type[ModelT], body: object, source: str = "body") -> ModelT:

@@ -12,9 +12,11 @@ from __future__ import annotations
 
 import enum
 import inspect
+import math
 from abc import abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from importlib import import_module
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 from pydantic import BaseModel, ConfigDict
@@ -53,6 +55,25 @@ if TYPE_CHECKING:
     from solver.results.files import Dataset
     from solver.results.told import Told
     from solver.scene.scene import Scene
+
+
+def rounded(value: float, digits: int = 3) -> float:
+    """Return a number as it is proposed."""
+    return float(f"{value:.{digits}g}")
+
+
+def middle_hz(scene: Scene) -> float:
+    """Return the middle of the band as it is proposed."""
+    low, high = scene.observe.band
+    return rounded(math.sqrt(low * high) if low > 0.0 else high / 2.0, 4)
+
+
+def first_order(scene: Scene) -> int:
+    """Return the engine order of the first force that has one; 0 without."""
+    return next((one.engine_order for one in scene.excitation if one.engine_order is not None), 0)
+
+
+NO_SECTORS = "The scene is one blade: it has no sectors."
 
 
 class Watch(NamedTuple):
@@ -119,6 +140,23 @@ class Answer(NamedTuple):
         return self._replace(result=result, json={**self.json, **further}, plot=result.plot)
 
 
+class Question(NamedTuple):
+    """How a designer asks for a study, and what it takes: points of a response, as the plan prices one."""
+
+    title: str
+    group: str  # damper, life, engine, rig or checks
+    points: int | None = None
+
+
+class Proposed(NamedTuple):
+    """Keys of a body that a scene suggests: which of them it does not say itself but are assumed, and those
+    that are a share of the highest peak of its response."""
+
+    body: Json = MappingProxyType({})
+    assumed: Sequence[str] = ()
+    of_peak: Mapping[str, float] = MappingProxyType({})
+
+
 class Study(SceneRequest):
     """Root of the studies: the keys are fields, an alias is how bodies and options call one.
 
@@ -126,8 +164,8 @@ class Study(SceneRequest):
     model of its RESULT; which arguments of the function are GROUPED, objects of a class whose fields are keys
     (``{"search": "solver:WorstSearch"}``); for people what it SHOWS, by which function a result is TOLD,
     which SWEEPS it stores, what its progress has COUNTED; of its picture what makes the FIGURE, and the key
-    that is EMPTY where there is none, with what is said then. Its docstring is the help of the command, the
-    first line of which is its summary.
+    that is EMPTY where there is none, with what is said then; which question it ASKS. Its docstring is the
+    help of the command, the first line of which is its summary.
     """
 
     model_config = ConfigDict(validate_by_alias=True, defer_build=True)
@@ -143,6 +181,7 @@ class Study(SceneRequest):
     GROUPED: ClassVar[Mapping[str, str]] = {}
     EMPTY: ClassVar[tuple[str, str]]
     FIGURE: ClassVar[str]
+    ASKS: ClassVar[Question]
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_config: Any) -> None:
@@ -157,6 +196,33 @@ class Study(SceneRequest):
     @abstractmethod
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large for one job."""
+
+    @classmethod
+    def propose(cls, _scene: Scene) -> Proposed | str:
+        """Return what a scene suggests, or why it has no such study."""
+        return Proposed()
+
+    @classmethod
+    def lacks(cls, given: Collection[str]) -> bool:
+        """Return whether it can not be asked with these keys alone."""
+        fields = ((name, cls.model_fields[name]) for name in cls.own_keys())
+        return any(field.is_required() and name not in given for name, field in fields)
+
+    @classmethod
+    def completed(cls, scene: Scene, given: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what was asked; where that is not enough, with what the scene suggests for all else."""
+        if not cls.lacks(given):
+            return dict(given)
+        found = cls.propose(scene)
+        if isinstance(found, str):
+            raise SettingError("scene", scene.name, f"is not for `{cls.NAME}`: {found}")
+        names = {field.alias or name: name for name, field in cls.model_fields.items()}
+        body = {names[key]: value for key, value in found.body.items()}
+        body.update(given)
+        if missing := {names[key]: share for key, share in found.of_peak.items() if names[key] not in body}:
+            branch = on_demand("solver:sweep")(scene, harmonics=body.get("harmonics", 11))
+            body |= {name: rounded(share * branch.peak.value) for name, share in missing.items()}
+        return body
 
     @classmethod
     def compute(cls, scene: Scene, asked: Mapping[str, Any], watch: Watch) -> Answer:

@@ -1,4 +1,4 @@
-"""The card of studies without a view of their own, with a kind that the package does not know."""
+"""Studies as questions: those that a scene has something for, a kind that the package does not know."""
 
 from __future__ import annotations
 
@@ -19,41 +19,47 @@ if TYPE_CHECKING:
 def test_a_kind_without_a_view_has_a_form_and_a_result(browser: Browser, site: Site) -> None:
     with opened(browser, site) as (context, watch):
         page = context.new_page()
-        page.goto(f"{site.url}/?scene=two-dof&tab=runs")
+        page.goto(f"{site.url}/?scene=two-dof&tab=studies")
         page.locator("html[data-ready]").wait_for(state="attached")
-        names = page.locator("#others-kind option").all_text_contents()
-        assert set(names) == {
-            "peaks",
-            "plan",
-            "solve",
-            "margin",
-            "mistuning",
-            "posterior",
-            "worst-mistuning",
-            "controlled",
-            "sensitivities",
-            "transient",
-            "quasi-periodic",
-            "wear",
-            "distortion",
-        }
-        page.select_option("#others-kind", "distortion")
-        expect(page.locator("#others-summary")).to_have_text(
-            "How much of a response is not in its first harmonic."
-        )
-        page.get_by_label("frequencies (needed)").fill("0.9, -1")
+        card = page.locator("#ask-distortion")
+        expect(card).to_contain_text("How much of a response is not in its first harmonic.")
+        card.get_by_label("frequencies (needed)").fill("0.9, -1")
         watch.allowed += ("422",)
-        page.locator("#others-form").get_by_role("button", name="Submit").click()
-        expect(page.locator("#others-fields .field.wrong .message")).to_contain_text("got -1")
-        page.get_by_label("frequencies (needed)").fill("0.9, 1.2")
-        page.locator("#others-form").get_by_role("button", name="Submit").click()
-        expect(page.locator("#others-status")).to_contain_text("distortion is done", timeout=60_000)
+        card.get_by_role("button", name="Run").click()
+        expect(card.locator(".field.wrong .message")).to_contain_text("got -1")
+        card.get_by_label("frequencies (needed)").fill("0.9, 1.2")
+        card.get_by_role("button", name="Run").click()
+        expect(page.locator("#ask-distortion-status")).to_contain_text("✓", timeout=60_000)
         [job] = httpx.get(f"{site.url}/v1/jobs?kind=distortion").json()["items"]
         found = httpx.get(f"{site.url}/v1/jobs/{job['id']}/results").json()["result"]
-        expect(page.locator("#others-result")).to_contain_text(f"{found['worst']:.6f}"[:7])
+        expect(page.locator("#ask-distortion-result")).to_contain_text(f"{found['worst']:.6f}"[:7])
         assert f"distortion={job['id']}" in page.url
         page.reload()
-        expect(page.locator("#others-status")).to_contain_text("distortion is done")
+        expect(page.locator("#ask-distortion-status")).to_contain_text("✓")
+
+
+def test_studies_are_questions_that_are_filled_in(browser: Browser, site: Site) -> None:
+    """A study runs at one press; what a scene has nothing for says why; measurements come as for a fit."""
+    with opened(browser, site) as (context, _):
+        page = context.new_page()
+        page.goto(f"{site.url}/?scene=two-dof&tab=studies&harmonics=3")
+        page.locator("html[data-ready][data-live]").wait_for(state="attached")
+        kinds = {one["name"] for one in httpx.get(f"{site.url}/v1/kinds").json()["items"]}
+        assert page.locator("#questions-cards article").count() == len(kinds)
+        expect(page.locator("#ask-mistuning")).to_contain_text("no sectors")
+        expect(page.locator("#ask-mistuning button")).to_have_count(0)
+        expect(page.locator("#ask-margin-from")).to_have_value("25")
+        expect(page.locator("#ask-margin-limit")).not_to_have_value("")
+        expect(page.locator("#ask-margin .assumed input")).to_have_attribute("id", "ask-margin-limit")
+        page.get_by_role("group", name="Questions about").get_by_role("button", name="Damper").click()
+        expect(page.locator("#ask-march")).to_be_hidden()
+        page.click("#ask-margin-submit")
+        expect(page.locator("#ask-margin-status")).to_contain_text("✓")
+        expect(page.locator("#ask-margin-result svg.chart")).to_have_count(2)
+        page.get_by_role("group", name="Questions about").get_by_role("button", name="Rig").click()
+        expect(page.locator("#ask-posterior-submit")).to_have_text("Choose measurements…")
+        page.click("#ask-posterior-submit")
+        expect(page.locator("#identify")).to_be_visible()
 
 
 STUDIES = {
@@ -89,12 +95,12 @@ def test_a_study_is_drawn(browser: Browser, site: Site, kind: str) -> None:
     job = httpx.post(f"{site.url}/v1/jobs", json={"kind": kind, **body}, timeout=120).json()
     with opened(browser, site) as (context, _):
         page = context.new_page()
-        page.goto(f"{site.url}/?scene={body['scene']}&tab=runs&{kind}={job['id']}")
+        page.goto(f"{site.url}/?scene={body['scene']}&tab=studies&{kind}={job['id']}")
         page.locator("html[data-ready]").wait_for(state="attached")
-        expect(page.locator("#others-status")).to_contain_text(f"{kind} is done", timeout=90_000)
-        expect(page.locator("#others-result svg.chart")).to_have_count(len(drawings))
+        expect(page.locator(f"#ask-{kind}-status")).to_contain_text("✓", timeout=90_000)
+        expect(page.locator(f"#ask-{kind}-result svg.chart")).to_have_count(len(drawings))
         for label, words in drawings.items():
-            chart = page.locator(f'#others-result svg.chart[aria-label="{label}"]')
+            chart = page.locator(f'#ask-{kind}-result svg.chart[aria-label="{label}"]')
             expect(chart).to_be_visible()
             for word in words.split():
                 expect(chart).to_contain_text(word)
@@ -103,8 +109,8 @@ def test_a_study_is_drawn(browser: Browser, site: Site, kind: str) -> None:
             assert "NaN" not in chart.inner_html()
         # The form says what was asked, tables of tables too.
         assert "[object" not in str(
-            page.locator("#others-form input").evaluate_all("all => all.map(one => one.value)")
+            page.locator(f"#ask-{kind}-form input").evaluate_all("all => all.map(one => one.value)")
         )
         if folder := os.environ.get("PICTURES"):  # to look at them
             page.set_viewport_size({"width": 1100, "height": 2600})
-            page.locator("#others").screenshot(path=f"{folder}/{kind}.png")
+            page.locator(f"#ask-{kind}").screenshot(path=f"{folder}/{kind}.png")

@@ -57,13 +57,13 @@ def test_tabs_show_their_cards_and_a_link_keeps_them(profile: Profile, site: Sit
     expect(page.locator("#map")).to_be_hidden()
     page.locator("#tab-response").focus()
     page.keyboard.press("ArrowRight")
-    expect(page.locator("#tab-map")).to_be_focused()
-    expect(page.get_by_role("tab", name="Map")).to_have_attribute("aria-selected", "true")
-    expect(page.locator("#map")).to_be_visible()
+    expect(page.locator("#tab-design")).to_be_focused()
+    expect(page.get_by_role("tab", name="Design")).to_have_attribute("aria-selected", "true")
+    expect(page.locator("#problem")).to_be_visible()
     expect(page.locator("#live")).to_be_hidden()
-    assert "tab=map" in page.url
+    assert "tab=design" in page.url
     page.reload()
-    expect(page.locator("#map")).to_be_visible()
+    expect(page.locator("#problem")).to_be_visible()
     page.click("#tab-runs")
     expect(page.locator("#runs")).to_be_visible()
     expect(page.locator("#map")).to_be_hidden()
@@ -249,8 +249,8 @@ def test_a_design_with_a_scene_of_its_own_and_a_kind_without_a_view_are_opened(
         expect(page.locator("#design-facts")).to_contain_text(f"{found['optimum']['damper.N0']:.5g} N")
     page.click("#tab-runs")
     row(page, peaks).locator(".run-name").click()
-    expect(page.locator("#others-status")).to_contain_text("peaks is done")
-    expect(page.locator("#others-from")).to_have_value("60")
+    expect(page.locator("#ask-peaks-status")).to_contain_text("✓")
+    expect(page.locator("#ask-peaks-bar")).to_contain_text("from 60 N to 150 N")
 
 
 @pytest.mark.long

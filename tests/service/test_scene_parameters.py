@@ -6,6 +6,7 @@ import httpx
 import pytest
 
 import solver
+from service.jobs.names import there
 
 
 @pytest.mark.parametrize("name", ["two-dof", "bladed-disk", "platform-wedge", "shroud-3d"])
@@ -64,19 +65,26 @@ def test_a_study_is_taken_as_it_is_proposed(shipped: httpx.Client, name: str) ->
     assert designed
     path, bounds = next(iter(designed.items()))
     assert 0.0 <= bounds[0] < bounds[1]
-    varied = {"variables": {path: bounds}}
     measured = {"frequency": list(scene.observe.band), "amplitude": [1.0, 1.0]}
     further: dict[str, dict[str, object]] = {
-        "map": {"parameter": path, "from": bounds[0], "to": bounds[1]}, "mistuning": {"of": "nothing"},
-        "identify": {"data": [measured]}, "design": varied, "pareto": varied,
+        "identify": {"data": [measured]}, "posterior": {"data": [measured]},
     }  # fmt: skip
+    assert {one["kind"] for one in told["studies"]} == set(there())
     for study in told["studies"]:
-        body = {"kind": study["kind"], "scene": name, **study["body"], **further.get(study["kind"], {})}
-        answer = shipped.post("/v1/jobs", json=body)
-        if answer.is_success:
-            shipped.delete(f"/v1/jobs/{answer.json()['id']}")
-        good = study["refused"] is None and study["kind"] != "mistuning"
-        assert answer.is_success == good, (study, answer.text)
+        assert study["title"].endswith("?")
+        assert study["group"] in ("damper", "life", "engine", "rig", "checks")
+        assert study["points"] is not None or study["kind"] in further
+        assert set(study["assumed"]) <= set(study["body"])
+        if study["refused"] is not None:
+            assert study["body"] == {}
+            continue
+        shares = {key: 1e-3 * share for key, share in study["of_peak"].items()}
+        body = {"kind": study["kind"], "scene": name, **study["body"], **shares}
+        answer = shipped.post("/v1/jobs", json={**body, **further.get(study["kind"], {})})
+        assert answer.is_success, (study, answer.text)
+        shipped.delete(f"/v1/jobs/{answer.json()['id']}")
+        if "variables" in study["body"]:
+            assert study["body"]["variables"] == {path: bounds}
 
 
 def test_a_map_follows_ridges_where_every_law_lets_it(shipped: httpx.Client) -> None:

@@ -131,6 +131,7 @@ def _identify(
 def computed(keys: Keys, scene: Scene, asked: dict[str, Any], columns: list[str] | None) -> Answer:
     """Compute what is asked of files."""
     study = keys.study
+    asked = study.completed(scene, asked)
     if wrong := study.model_construct(**asked).issues(scene):
         raise refused(wrong, keys.flags)
     with keys.named(), watched(study) as watch:

@@ -101,13 +101,14 @@ class KeyOption:
             raise InputError(f"`{self.flag}` takes JSON, got {text!r}: {error}") from error
 
 
-def key_options(kind: JobKind, local: Command | None) -> list[KeyOption]:
+def key_options(kind: JobKind, local: Command | None, *, free: bool = False) -> list[KeyOption]:
     """An option for every key of a kind but its scene, those of the local command first.
 
     Parameters
     ----------
     kind : what is submitted.
     local : the command that computes the same here, if there is one; its options are reused.
+    free : none is needed: what the scene suggests stands for those left out.
     """
     described = kind.request.model_json_schema()
     needed = described.get("required", ())
@@ -123,7 +124,10 @@ def key_options(kind: JobKind, local: Command | None) -> list[KeyOption]:
     for key, flag in flags.items():
         whole, schema = described["properties"][key], schemas[key]
         words = as_options(whole.get("description", ""), flags)
-        mine = known.get(flag) or _made(flag, said[key], schema, whole, words, needed=key in needed)
+        words = f"{words.rstrip('.')}; the scene suggests it." if free and key in needed else words
+        mine = known.get(flag) or _made(
+            flag, said[key], schema, whole, words, needed=not free and key in needed
+        )
         parameter = mine.replace(name=f"key_{key}", kind=inspect.Parameter.KEYWORD_ONLY)
         found.append(KeyOption(key, asked[key][0], flag, parameter, schema, said[key].metavar))
     order = [*known, *(one.flag for one in found)]

@@ -104,14 +104,10 @@ def _contact(given: AnyContact, found: ContactResponse, tau: FloatArray) -> dict
     if motion is not None:
         shares = {each.name.lower(): motion.count(each) / len(motion) for each in ContactMotion}
     return {
-        "name": found.name,
-        "state": found.state.value,
-        "slip": slip.tolist(),
-        "force": _closed(force),
+        "name": found.name, "state": found.state.value, "slip": slip.tolist(), "force": _closed(force),
         "load": np.maximum(load, 0.0).tolist(),
-        "motion": None if motion is None else [each.value for each in motion],
-        "shares": shares,
-    }
+        "motion": None if motion is None else [each.value for each in motion], "shares": shares,
+    }  # fmt: skip
 
 
 def _closed(samples: FloatArray) -> list[float]:

@@ -10,10 +10,12 @@ from optim.criteria.key import Name as Name
 from optim.criteria.key import Pair as Pair
 from optim.criteria.key import Ranges as Ranges
 from optim.problem.problem_keys import OPTIONS, ROBUST, ProblemKeys
+from service.jobs.common.scene_parameters import designed
 from service.jobs.common.scene_requests import HarmonicRequest
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.common.study_keys import NOTHING_DESIGNED
 from service.jobs.kind_registry import ABOUT_THE_JOB, JobKind
-from service.jobs.study import Study
+from service.jobs.study import Proposed, Study
 from solver.errors import Issue
 from solver.lab import from_lab
 
@@ -29,6 +31,12 @@ class ProblemRequest(ProblemKeys, Study, HarmonicRequest):
 
     COUNTED = "computed"
     KEYS: ClassVar[str] = ""
+
+    @classmethod
+    def propose(cls, scene: Scene) -> Proposed | str:
+        """Return what is designed by itself, with its range."""
+        found = designed(scene)
+        return Proposed({"variables": dict(found)}) if found else NOTHING_DESIGNED
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return everything wrong with the problem."""

@@ -13,7 +13,7 @@ from service.jobs.common.result_models import Table
 from service.jobs.common.scene_requests import HarmonicRequest, Number, ParameterPath, check
 from service.jobs.common.sizes import balance_issues
 from service.jobs.kind_registry import Flag
-from service.jobs.study import Answer, Watch
+from service.jobs.study import Answer, Proposed, Study, Watch
 from solver.errors import Issue, Naming, Shown
 from solver.lab import from_lab
 from solver.scene.descriptions import DISK_LOAD
@@ -64,9 +64,10 @@ def solved_issues(
 
 
 FREQUENCY = "frequency"
+NOTHING_DESIGNED = "The scene has no contact to design."
 
 
-class RangeRequest(HarmonicRequest):
+class RangeRequest(Study, HarmonicRequest):
     """A range of a parameter; the frequency is looked at over the scene's band."""
 
     model_config = ConfigDict(validate_by_alias=True)
@@ -76,6 +77,15 @@ class RangeRequest(HarmonicRequest):
     )
     start: Annotated[Number, Flag(metavar="A")] = Field(alias="from", description="Start of the range.")
     stop: Annotated[Number, Flag(metavar="B")] = Field(alias="to", description="End of the range.")
+
+    @classmethod
+    def propose(cls, scene: Scene) -> Proposed | str:
+        """Return the range of what is designed by itself."""
+        from service.jobs.common.scene_parameters import designed
+
+        for path, (low, high) in designed(scene).items():
+            return Proposed({"parameter": path, "from": low, "to": high})
+        return NOTHING_DESIGNED
 
 
 def range_issues(request: RangeRequest, scene: Scene) -> list[Issue]:

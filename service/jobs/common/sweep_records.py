@@ -128,18 +128,12 @@ def design_record(result: DesignResult) -> DesignRecord:
 
         feasible = evaluation.violation(problem.scales) <= KEPT
     return _record(
-        result,
-        method=result.method.value,
-        robust=False,
-        feasible=feasible,
+        result, method=result.method.value, robust=False, feasible=feasible,
         objective=None if evaluation is None else json_number(evaluation.objective),
-        peak=None if peak is None else peak.value,
-        peak_at=None if peak is None else peak.at,
-        limit=result.limit,
-        band_hz=result.band_hz,
-        evaluations=result.evaluations,
+        peak=None if peak is None else peak.value, peak_at=None if peak is None else peak.at,
+        limit=result.limit, band_hz=result.band_hz, evaluations=result.evaluations,
         work=json_number(result.work),
-    )
+    )  # fmt: skip
 
 
 def robust_record(result: RobustResult) -> DesignRecord:
@@ -150,18 +144,11 @@ def robust_record(result: RobustResult) -> DesignRecord:
     peak = max((r for r in rows if r.quantity.name == "peak"), key=lambda row: row.value, default=None)
     bands = [row.value for row in rows if row.quantity.name == "band"]
     return _record(
-        result,
-        method=result.aim.value,
-        robust=True,
-        feasible=side is not None and side.feasible,
-        objective=json_number(result.objective),
-        peak=None if peak is None else peak.value,
-        peak_at=None if peak is None else json_number(peak.at_hz),
-        limit=result.problem.limit,
-        band_hz=max(bands, default=None),
-        evaluations=result.designs,
-        work=float(result.responses),
-    )
+        result, method=result.aim.value, robust=True, feasible=side is not None and side.feasible,
+        objective=json_number(result.objective), peak=None if peak is None else peak.value,
+        peak_at=None if peak is None else json_number(peak.at_hz), limit=result.problem.limit,
+        band_hz=max(bands, default=None), evaluations=result.designs, work=float(result.responses),
+    )  # fmt: skip
 
 
 def contact_values(scene: Scene, parameter: str) -> tuple[ContactValues, ...]:

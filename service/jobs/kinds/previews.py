@@ -453,15 +453,9 @@ def warm_up() -> None:
         return False
 
     spec = {
-        "scene": scene.to_dict(),
-        "harmonics": 3,
-        "limit": None,
-        "contact": None,
-        "frequency_hz": 1.05,
-        "mode": None,
-        "motion": None,
-        "nodal_diameter": None,
-    }
+        "scene": scene.to_dict(), "harmonics": 3, "limit": None, "contact": None, "frequency_hz": 1.05,
+        "mode": None, "motion": None, "nodal_diameter": None,
+    }  # fmt: skip
     for run in runs:
         run(spec, Silent(), nothing)
 

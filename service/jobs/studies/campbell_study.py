@@ -14,7 +14,7 @@ from service.jobs.common.scene_requests import HarmonicRequest
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_registry import Flag, Json, NothingToDrawError, ReadSweep, StoredSweep
 from service.jobs.stored_figures import SweepRecord
-from service.jobs.study import Study
+from service.jobs.study import Proposed, Question, Study, first_order, rounded
 from solver.errors import Issue
 
 if TYPE_CHECKING:
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
     from solver.views.plots.curves import Response
 
+_ORDERS = 3  # are proposed
 _Order = Annotated[int, Field(strict=True, ge=1, le=10_000)]
 
 
@@ -37,6 +38,7 @@ class Campbell(Study, HarmonicRequest):
     EXAMPLES = ({"scene": "bladed-disk", "speeds_rpm": [[40000, 50000]], "orders": [1, 2, 3], "limit": 8e-5},)
     NAME, FUNCTION = "campbell", "optim:campbell_diagram"
     RESULT = answered("optim.results.studies_result:CampbellDiagram", "CampbellResult")
+    ASKS = Question("At which speeds does it resonate?", "engine", 350)
     TOLD = "optim.views.tables.studies:campbell"
     SHOWS = "crossings and speeds above the limit ([Campbell diagrams](disks.md#campbell-diagrams))"
     EMPTY = ("orders", "it stored no sweep to draw")
@@ -58,6 +60,15 @@ class Campbell(Study, HarmonicRequest):
         default=None,
         description="Frequencies looked at [Hz]; the scene's band and those of the running speeds.",
     )
+
+    @classmethod
+    def propose(cls, scene: Scene) -> Proposed | str:
+        """The running speeds that bring the engine orders into the band."""
+        (low, high), first = map(float, scene.observe.band), max(first_order(scene), 1)
+        most = max(scene.structure.sector_count // 2, first) if scene.structure.has_sectors else _ORDERS
+        orders = [order for order in range(first, first + _ORDERS) if order <= max(most, first)]
+        speeds = [rounded(60.0 * low / orders[-1], 4), rounded(60.0 * high / first, 4)]
+        return Proposed({"speeds_rpm": [speeds], "orders": orders, "band_hz": [low, high]}, ("orders",))
 
     def issues(self, _scene: Scene) -> list[Issue]:
         """Return what is wrong with speeds and band."""

@@ -19,7 +19,7 @@ from service.jobs.common.study_keys import CERTIFICATES, prepare, with_proofs
 from service.jobs.kind_registry import Json, ReadSweep, StoredSweep
 from service.jobs.outputs import JobOutput
 from service.jobs.stored_figures import SweepRecord
-from service.jobs.study import Answer, Watch
+from service.jobs.study import Answer, Question, Watch
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD
 
@@ -101,6 +101,7 @@ class _Design(NominalAndRobustKeys, ProblemRequest):
         },
     )
     NAME, FUNCTION, RESULT = "design", "optim:design", design_result
+    ASKS = Question("Which damper is best?", "damper", 2_500)
     KEYS = "those of [a design problem](design.md)"
     TOLD = "optim.views.tables.design:design"
     SHOWS, SWEEPS = "the optimum and what holds it", "every response computed"

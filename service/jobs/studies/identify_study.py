@@ -15,7 +15,7 @@ from service.jobs.common.result_models import KindResult, Table, answered
 from service.jobs.common.scene_requests import HarmonicRequest, Number, ParameterPath
 from service.jobs.common.sizes import balance_issues
 from service.jobs.kind_registry import Flag
-from service.jobs.study import Study
+from service.jobs.study import Proposed, Question, Study
 from solver.errors import Issue, SceneError, SettingError
 
 if TYPE_CHECKING:
@@ -92,6 +92,18 @@ class Measured(Study, HarmonicRequest):
         default=0, description="Of those places."
     )
 
+    @classmethod
+    def propose(cls, scene: Scene) -> Proposed | str:
+        """Friction and stiffness of the first part that has them."""
+        from service.jobs.common.scene_parameters import around
+
+        paths = [path for path in scene.parameter_paths() if path.rpartition(".")[2] in ("kt", "mu")]
+        first = paths[0].rpartition(".")[0] if paths else ""
+        own = [path for path in paths if path.rpartition(".")[0] == first and scene.value(path) > 0.0]
+        if not own:
+            return "The scene has no contact whose friction and stiffness a rig could measure."
+        return Proposed({"unknowns": {path: around(scene.value(path)) for path in own}})
+
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large; what is not is read, as a run will read it, to see what is wrong."""
         columns = [[v for v in table.values() if isinstance(v, list)] for table in self.data]
@@ -140,6 +152,7 @@ class Identify(Measured):
         },
     )
     NAME, FUNCTION, RESULT = "identify", "optim:identify", identify_result
+    ASKS = Question("Which values do my measurements give?", "rig")
     TOLD = "optim.views.tables.studies:identification"
     SHOWS = "estimates, intervals, what the data do not tell ([identification](identification.md))"
     EMPTY, COUNTED = ("runs", "there is no fit to draw"), "places"

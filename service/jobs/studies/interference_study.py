@@ -13,13 +13,14 @@ from service.jobs.common.scene_requests import FrequencyHz, check
 from service.jobs.common.sizes import is_quick, memory_issues
 from service.jobs.common.study_keys import of_keys
 from service.jobs.kind_registry import Flag, Json
-from service.jobs.study import Study
+from service.jobs.study import NO_SECTORS, Proposed, Question, Study, first_order, middle_hz, rounded
 from solver.errors import Issue
 from solver.first_use import on_demand
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
+_ABOVE_BAND = 2.0
 _Orders = Annotated[
     list[Annotated[int, Field(strict=True, ge=1, le=1_000_000)]], Field(min_length=1, max_length=1000)
 ]
@@ -36,6 +37,7 @@ class Interference(Study):
     RESULT = answered("solver.studies.study_results:InterferenceDiagram", "InterferenceResult")
     TOLD = "solver.views.tables.disks:interference"
     SHOWS = "frequencies at each nodal diameter, orders that meet them ([interference](disks.md))"
+    ASKS = Question("Which orders meet which modes?", "engine", 300)
     FIGURE = "solver.views.plots.disks:interference_figure"
     COUNTED = "nodal diameters"
 
@@ -54,6 +56,15 @@ class Interference(Study):
     within: Annotated[float, Field(ge=0.0, le=1.0), Flag(metavar="S")] = Field(
         default=0.05, description="Relative distance of an order from a family that counts."
     )
+
+    @classmethod
+    def propose(cls, scene: Scene) -> Proposed | str:
+        """The speed that brings the order of the scene into the middle of its band."""
+        if not scene.structure.has_sectors:
+            return NO_SECTORS
+        speed = scene.speed or rounded(60.0 * middle_hz(scene) / max(first_order(scene), 1))
+        body = {"speed_rpm": speed, "up_to_hz": _ABOVE_BAND * scene.observe.band[1]}
+        return Proposed(body, () if scene.speed else ("speed_rpm",))
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return why it is no disk, or a speed that cannot be."""

@@ -18,7 +18,7 @@ from service.jobs.kind_registry import Flag, JobKind, Json
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.stored_figures import StoredArray
 from service.jobs.studies.peaks_study import peaks_result
-from service.jobs.study import Study
+from service.jobs.study import Proposed, Question
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD
 
@@ -38,7 +38,7 @@ def map_result() -> type[KindResult]:
     )()  # fmt: skip
 
 
-class Map(Study, RangeRequest):
+class Map(RangeRequest):
     """Map the response over frequency and a parameter, with the ridge of its peaks."""
 
     EXAMPLES = ({
@@ -46,6 +46,7 @@ class Map(Study, RangeRequest):
         "frequencies": 400,
     },)  # fmt: skip
     NAME, FUNCTION, RESULT = "map", "solver:response_map", map_result
+    ASKS = Question("How does the response change with the damper?", "damper", 41_000)
     TOLD = "solver.views.tables.tracks:response_map"
     SHOWS, SWEEPS = "the amplitude on the grid, the ridge of its peaks", "those that look for peaks"
     FIGURE = "solver.views.plots.tracks:map_figure"
@@ -61,6 +62,14 @@ class Map(Study, RangeRequest):
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the range and, with a ridge, with the laws of the contacts."""
         return range_issues(self, scene) + (law_issues("ridge", scene) if self.ridge else [])
+
+    @classmethod
+    def propose(cls, scene: Scene) -> Proposed | str:
+        """Ridges are tracked where the law of every contact lets them be."""
+        told = super().propose(scene)
+        if isinstance(told, str):
+            return told
+        return Proposed({**told.body, "ridge": not law_issues("ridge", scene)})
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
@@ -145,14 +154,9 @@ def _ridge(spec: Mapping[str, Any], progress: OnProgress, should_stop: ShouldSto
     from service.jobs.common.sweep_records import packed, sweep_records
 
     track = solver.track_peak(
-        stored_scene(spec),
-        spec["parameter"],
-        spec["start"],
-        spec["stop"],
-        harmonics=spec["harmonics"],
-        on_progress=lambda share, _sweeps: progress(share, 0),
-        should_stop=should_stop,
-    )
+        stored_scene(spec), spec["parameter"], spec["start"], spec["stop"], harmonics=spec["harmonics"],
+        on_progress=lambda share, _sweeps: progress(share, 0), should_stop=should_stop,
+    )  # fmt: skip
     if track.status is solver.TrackStatus.STOPPED:
         raise PartStoppedError
     sweeps, arrays = packed(sweep_records(track.branches, intermediate=True))

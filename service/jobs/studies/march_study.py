@@ -13,7 +13,7 @@ from service.jobs.common.scene_requests import FrequencyHz, check
 from service.jobs.common.sizes import is_quick, march_issues
 from service.jobs.common.study_keys import of_keys
 from service.jobs.kind_registry import Flag
-from service.jobs.study import Answer, Study, Watch
+from service.jobs.study import Answer, Proposed, Question, Study, Watch, middle_hz
 from solver.errors import Issue
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ class March(Study):
         "solver.marching.march_result:MarchResult", "MarchResult", harmonics=list[float | None] | None,
         history=(Table | None, None),
     )  # fmt: skip
+    ASKS = Question("Does time marching agree?", "checks", 3_000)
     TOLD = "solver.views.tables.responses:march"
     SHOWS, COUNTED = "amplitude and periods marched", "periods"
     EMPTY = ("harmonics", "no response was found")
@@ -56,6 +57,11 @@ class March(Study):
     history: Annotated[bool, Field(strict=True)] = Field(
         default=False, description="Give the last period too: motion and loops of the contacts."
     )
+
+    @classmethod
+    def propose(cls, scene: Scene) -> Proposed | str:
+        """The middle of the band."""
+        return Proposed({"frequency_hz": middle_hz(scene)})
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""

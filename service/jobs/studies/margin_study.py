@@ -12,13 +12,14 @@ from service.jobs.common.result_models import Curve, answered
 from service.jobs.common.scene_requests import HarmonicRequest, Number, PositiveNumber, check
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_registry import Flag
-from service.jobs.study import Study
+from service.jobs.study import Proposed, Question, Study, rounded
 from solver.errors import Issue, Naming
 from solver.scene.descriptions import DAMPER_LOAD
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
+_AROUND, _ALLOWED = 4.0, 1.5  # of the excitation, and of its peak, what is proposed
 _Values = Annotated[dict[ParameterPath, Number], Field(max_length=1000)]
 _Dampers = Annotated[dict[Name, _Values], Field(min_length=1, max_length=50)]
 
@@ -34,6 +35,7 @@ class Margin(Study, HarmonicRequest):
     RESULT = answered(
         "solver.studies.study_results:MarginDiagram", "MarginResult", stress=list[Curve], used=list[Curve]
     )
+    ASKS = Question("What margin is left?", "damper", 7_000)
     TOLD = "solver.views.tables.tracks:margin"
     SHOWS = "stress over the excitation, what each damper allows ([criteria](criteria.md))"
     FIGURE, EMPTY = "solver.views.plots.tracks:margin_figure", ("level", "it has no level to draw")
@@ -53,6 +55,16 @@ class Margin(Study, HarmonicRequest):
     limit: Annotated[PositiveNumber | None, Flag(metavar="A")] = Field(
         default=None, description="Amplitude allowed [m], of a scene without strengths."
     )
+
+    @classmethod
+    def propose(cls, scene: Scene) -> Proposed | str:
+        """Excitations around the scene's own; without strengths a limit on the amplitude is assumed."""
+        force = max((abs(one.amplitude) for one in scene.excitation), default=0.0)
+        if not force:
+            return "The scene has no excitation."
+        strengths = any(one.material is not None for one in scene.recovery)
+        ends = {"from": rounded(force / _AROUND), "to": rounded(force * _AROUND)}
+        return Proposed(ends, of_peak={} if strengths else {"limit": _ALLOWED})
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the ends and the dampers."""

@@ -18,7 +18,7 @@ from service.jobs.job_parts import Division, JobPart, PartOutput, PartStoppedErr
 from service.jobs.kind_registry import Flag, JobKind
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.stored_figures import StoredArray
-from service.jobs.study import Answer, Study
+from service.jobs.study import NO_SECTORS, Answer, Proposed, Question, Study
 from solver.errors import Issue, SceneError, SettingError
 from solver.jit.timer import clock
 
@@ -77,6 +77,16 @@ def part_issues(attempt: Callable[[], object]) -> list[Issue]:
     return []
 
 
+def blades_differ(scene: Scene) -> Proposed | str:
+    """Return what blades are assumed to be told apart by: the mass where the scene observes them."""
+    from solver.studies.mistuning import disk_factors
+
+    if not scene.structure.has_sectors:
+        return NO_SECTORS
+    wrong = part_issues(lambda: disk_factors(scene, [scene.observe.dof], 0.0, 1, 1))
+    return wrong[0].message if wrong else Proposed({"of": [scene.observe.dof]}, ("of",))
+
+
 mistuning_result = answered(
     "solver.studies.study_results:MistuningStudy", "MistuningResult", dof=str, samples=list[Table],
     quantiles=list[Table],
@@ -95,6 +105,7 @@ class Mistuning(Study, HarmonicRequest):
         "harmonics": 5,
     },)  # fmt: skip
     NAME, FUNCTION, RESULT = "mistuning", "solver:mistuning_study", mistuning_result
+    ASKS = Question("What do unequal blades do?", "engine", 300_000)
     TOLD = "solver.views.tables.disks:mistuning"
     SHOWS = "the magnification over many disks and the worst of them ([disks](disks.md))"
     SWEEPS, COUNTED = "the tuned disk's, and that of the worst blade", "disks"
@@ -122,6 +133,11 @@ class Mistuning(Study, HarmonicRequest):
     stop: Annotated[FrequencyHz | None, Flag(metavar="F")] = Field(
         default=None, alias="to", description="Highest frequency [Hz]; the scene's band."
     )
+
+    @classmethod
+    def propose(cls, scene: Scene) -> Proposed | str:
+        """Return what the blades are told apart by."""
+        return blades_differ(scene)
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return why it is no disk, and what is wrong with DOF and range."""
@@ -220,15 +236,11 @@ def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutpu
     parts = list(outputs.values())
     [tuned], others = _peaks(parts[0]), parts[1:]
     study = joined_study(
-        stored_scene(spec),
-        of=spec["of"],
-        spread=spec["spread"],
-        seed=spec["seed"],
-        harmonics=spec["harmonics"],
-        tuned=tuned,
+        stored_scene(spec), of=spec["of"], spread=spec["spread"], seed=spec["seed"],
+        harmonics=spec["harmonics"], tuned=tuned,
         disks=[peaks for part in others for peaks in _peaks(part)],
         seconds=sum(part.result["seconds"] for part in parts),
-    )
+    )  # fmt: skip
     # The first of those that are equally high.
     highest = max(others, key=lambda part: part.result["largest"], default=None)
     sweeps = [part for part in (parts[0], highest) if part is not None]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,7 +15,7 @@ from service.jobs.common.scene_requests import HarmonicRequest, Number, Positive
 from service.jobs.common.sizes import MOST_MOTIONS, POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.common.study_keys import CERTIFICATES, of_keys, prepare, with_certificates
 from service.jobs.kind_registry import Flag, Json, ReadSweep, StoredSweep
-from service.jobs.study import Answer, Study, Watch
+from service.jobs.study import Answer, Proposed, Question, Study, Watch, rounded
 from solver.errors import Issue, Naming
 from solver.lab import from_lab
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from solver.results.told import Told
-    from solver.scene.scene import Scene
+    from solver.scene.scene import AnyContact, Scene
 
 
 MOST_CONTACTS = 40
@@ -30,6 +31,9 @@ MOST_DOFS = 400
 SAMPLES = 97
 """Of a loop, its first again at the end."""
 FAR = 100.0
+_MODAL = (1e-7, 0.1)  # √kg m, where nothing says at which motion contacts begin to slip
+_AROUND_SLIP = (0.05, 300.0)
+_EXACT_PEAKS = 8
 _AMPLITUDE = "excitation.amplitude"
 
 
@@ -119,6 +123,14 @@ _FURTHER: dict[str, Any] = dict.fromkeys(("performance", "limit_cycles", "motion
 _FURTHER["certificates"] = CERTIFICATES
 
 
+def _slip(contact: AnyContact) -> float:
+    """Return the motion at which a contact begins to slip [m]; 0 if its law does not say it."""
+    friction, stiffness = (getattr(contact, key, 0.0) for key in ("mu", "kt"))
+    if contact.load is None or not stiffness:
+        return 0.0
+    return float(friction * contact.load.mean / stiffness)
+
+
 @cache
 def modes_result() -> type[BaseModel]:
     """Return the schema of a nonlinear mode, or of the forced responses with `phase_resonance`."""
@@ -139,6 +151,7 @@ class Modes(Study, HarmonicRequest):
 
     EXAMPLES = ({"scene": "two-dof", "mode": 1, "from": 0.01, "to": 100},)
     NAME, FUNCTION, RESULT = "modes", "solver:nonlinear_mode", modes_result
+    ASKS = Question("How do frequency and damping change with amplitude?", "rig", 4_000)
     TOLD = "solver.views.tables.disks:mode"
     SHOWS = "frequency and damping ratio over the amplitude ([modes](modes.md))"
     EMPTY = ("amplitude", "no point of the mode was found")
@@ -180,6 +193,19 @@ class Modes(Study, HarmonicRequest):
         default=False,
         description="In place of the mode the forced responses that lag by 90°: which force each takes.",
     )
+
+    @classmethod
+    def propose(cls, scene: Scene) -> Proposed | str:
+        """Amplitudes around the one at which the contacts begin to slip, as far as the scene says it."""
+        slips = [one for one in map(_slip, scene.contacts) if one > 0.0]
+        masses = [float(mass.m) for mass in getattr(scene.structure, "masses", ())]
+        ends, known = _MODAL, bool(slips and masses)
+        if known:
+            root = math.sqrt(sum(masses))
+            ends = (_AROUND_SLIP[0] * min(slips) * root, _AROUND_SLIP[1] * max(slips) * root)
+        low, high = (rounded(end, 2) for end in ends)
+        more = {"performance": True, "motions": True, "exact_peaks": _EXACT_PEAKS}
+        return Proposed({"from": low, "to": high, **more}, () if known else ("from", "to"))
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return which questions do not go together, and what is wrong with the mode."""

@@ -9,6 +9,7 @@ from service.jobs.common.problem_requests import ProblemRequest
 from service.jobs.common.result_models import answered
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.stored_figures import SweepRecord
+from service.jobs.study import Question
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD
 
@@ -29,6 +30,7 @@ class _Pareto(PointsOfFront, ProblemRequest):
 
     EXAMPLES = ({"scene": "bladed-disk", "variables": {DISK_LOAD: [20, 3000]}, "limit": 8e-5},)
     NAME, FUNCTION, RESULT = "pareto", "optim:pareto_front", pareto_result
+    ASKS = Question("What does a narrower band cost?", "damper", 110_000)
     KEYS = "those of a design problem, `points`"
     TOLD = "optim.views.tables.design:front"
     SHOWS, SWEEPS = "the front of [peak against band](design.md#peak-against-band)", "those of its points"

@@ -20,7 +20,7 @@ from service.jobs.common.study_keys import (
 )
 from service.jobs.kind_registry import Flag
 from service.jobs.stored_figures import SweepRecord
-from service.jobs.study import Answer, Study, Watch
+from service.jobs.study import Answer, Proposed, Question, Watch
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD
 
@@ -34,7 +34,7 @@ peaks_result = answered(
 )
 
 
-class Peaks(Study, RangeRequest):
+class Peaks(RangeRequest):
     """Track the highest peak over a parameter.
 
     With exact derivatives; sweeps check that no peak was missed, and the least highest peak is found.
@@ -42,6 +42,7 @@ class Peaks(Study, RangeRequest):
 
     EXAMPLES = ({"scene": "bladed-disk", "parameter": DISK_LOAD, "from": 20, "to": 3000},)
     NAME, FUNCTION, RESULT = "peaks", "solver:track_peak", peaks_result
+    ASKS = Question("How does the peak follow the damper?", "damper", 12_000)
     TOLD = "solver.views.tables.tracks:track"
     SHOWS = "the highest peak over the parameter, where it is least ([peaks](peaks.md))"
     FIGURE, EMPTY = "solver.views.plots.tracks:track_figure", ("parameter", "no peak was tracked")
@@ -52,6 +53,12 @@ class Peaks(Study, RangeRequest):
     )
 
     certify: Certify = False
+
+    @classmethod
+    def propose(cls, scene: Scene) -> Proposed | str:
+        """Return the range of what is designed by itself, where peaks can be tracked."""
+        wrong = law_issues("scene", scene)
+        return wrong[0].said() if wrong else super().propose(scene)
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the range and the laws of the contacts."""

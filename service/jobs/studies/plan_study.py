@@ -11,7 +11,7 @@ from pydantic import ConfigDict
 from service.jobs.common.result_models import KindResult, answered
 from service.jobs.common.scene_requests import HarmonicRequest
 from service.jobs.common.study_keys import AUTO, EffectsWord, effects_issues, solved_issues, with_effects
-from service.jobs.study import Answer, Study, Watch
+from service.jobs.study import Answer, Question, Study, Watch
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD
 
@@ -34,6 +34,7 @@ class Plan(Study, HarmonicRequest):
     model_config = ConfigDict(defer_build=False)
     EXAMPLES = (EXAMPLE,)
     NAME, FUNCTION, RESULT = "plan", "solver:plan", plan_result
+    ASKS = Question("What does this scene call for?", "checks", 1)
     TOLD = "solver.views.tables.responses:plan"
     SHOWS = "the effects in use and left out, sizes and estimated cost"
 

@@ -12,7 +12,7 @@ from service.jobs.common.scene_requests import HarmonicRequest, PositiveNumber
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_registry import Flag, Json
 from service.jobs.stored_figures import SweepRecord
-from service.jobs.study import Answer, Study, Watch
+from service.jobs.study import Answer, Question, Study, Watch
 from solver.errors import Issue
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ class Sensitivities(Study, HarmonicRequest):
     RESULT = answered(
         "optim.results.studies_result:SensitivityResult", "SensitivitiesResult", peaks=list[PeakAt]
     )
+    ASKS = Question("Which value matters most?", "damper", 500)
     TOLD = "optim.views.tables.studies:shares"
     SHOWS = "what one per cent of a parameter does to peaks and band ([its page](design.md#sensitivities))"
     SWEEPS, FIGURE = "the response", "optim.views.plots.figures:sensitivities_figure"

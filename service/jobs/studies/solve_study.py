@@ -19,7 +19,7 @@ from service.jobs.common.study_keys import (
     with_effects,
 )
 from service.jobs.kind_registry import Flag
-from service.jobs.study import Answer, Study, Watch
+from service.jobs.study import Answer, Proposed, Question, Study, Watch, middle_hz
 from solver.errors import Issue, Naming, Shown
 from solver.first_use import on_demand
 from solver.response.stability import MOST_STARTS
@@ -65,6 +65,7 @@ class Solve(Study, HarmonicRequest):
         {"scene": "two-dof", "frequency_hz": 1.05, "all": True, "starts": 8},
     )
     NAME, FUNCTION, RESULT = "solve", "solver:solve", solve_result
+    ASKS = Question("What happens at one frequency?", "checks", 20)
     TOLD = "solver.views.tables.responses:solution"
     SHOWS, COUNTED = "the response at one frequency", "solutions"
     EMPTY = ("harmonics", "no response was found")
@@ -96,6 +97,11 @@ class Solve(Study, HarmonicRequest):
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63), Flag(metavar="N")] = Field(
         default=0, description="Of the random starts of `all`."
     )
+
+    @classmethod
+    def propose(cls, scene: Scene) -> Proposed | str:
+        """The middle of the band."""
+        return Proposed({"frequency_hz": middle_hz(scene)})
 
     def issues(self, _scene: Scene) -> list[Issue]:
         """Return what does not go together, and words of effects that are none."""

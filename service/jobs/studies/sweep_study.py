@@ -30,7 +30,7 @@ from service.jobs.common.study_keys import (
 )
 from service.jobs.kind_registry import Flag, JobKind, Json, ReadSweep, StoredSweep
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
-from service.jobs.study import Answer, Study, Watch
+from service.jobs.study import Answer, Question, Study, Watch
 from solver.errors import Issue, Naming, SettingError, Shown
 from solver.scene.descriptions import DISK_LOAD
 
@@ -66,6 +66,7 @@ class Sweep(Study, HarmonicRequest):
         {"scene": "bladed-disk", "parameter": DISK_LOAD, "from": 20, "to": 300, "frequency_hz": 755},
     )
     NAME, FUNCTION, RESULT = "sweep", "solver:sweep", sweep_result
+    ASKS = Question("How does it respond?", "damper", 350)
     TOLD = "solver.views.tables.responses:branch"
     SHOWS, SWEEPS = "peaks, band, folds", "the branch"
     EMPTY = ("parameter", "it stored no sweep to draw")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,13 +14,14 @@ from service.jobs.common.scene_requests import NotNegative, PositiveNumber, chec
 from service.jobs.common.sizes import is_quick, march_issues
 from service.jobs.common.study_keys import of_keys
 from service.jobs.kind_registry import Flag
-from service.jobs.study import Study
+from service.jobs.study import Proposed, Question, Study, middle_hz, rounded
 from solver.errors import Issue, SettingError
 
 if TYPE_CHECKING:
     from solver.marching.transient import Ramp
     from solver.scene.scene import Scene
 
+_PERIODS = 400  # of the middle of the band, in which a run is proposed
 _Rates = Annotated[list[PositiveNumber], Field(min_length=1, max_length=50)]
 
 
@@ -32,6 +34,7 @@ class Transient(Study):
     EXAMPLES = ({"scene": "two-dof", "begin_hz": 0.5, "end_hz": 1.6, "rate_hz_per_s": 0.01},)
     NAME, FUNCTION = "transient", "solver:transient"
     RESULT = answered("solver.marching.march_result:TransientResult", "TransientResult")
+    ASKS = Question("What does a run-up do?", "engine", 25_000)
     TOLD = "solver.views.tables.responses:transient"
     SHOWS, COUNTED = "the largest amplitude of a run ([transients](transients.md))", "turns"
     FIGURE, EMPTY = "solver.views.plots.motion:transient_figure", ("time", "nothing was run through")
@@ -64,6 +67,20 @@ class Transient(Study):
     steps_per_period: Annotated[int | None, Field(strict=True, ge=16, le=1_000_000), Flag("--steps", "N")] = (
         Field(default=None, description="Steps in a period of the highest frequency; chosen if left out.")
     )
+
+    @classmethod
+    def propose(cls, scene: Scene) -> Proposed | str:
+        """Through the band in some hundred periods: how fast, the scene does not say."""
+        (low, high), middle = scene.observe.band, middle_hz(scene)
+        rate = rounded((high - low) * middle / _PERIODS, 2)
+        return Proposed(
+            {"begin_hz": float(low), "end_hz": float(high), "rate_hz_per_s": rate}, ("rate_hz_per_s",)
+        )
+
+    @classmethod
+    def lacks(cls, given: Collection[str]) -> bool:
+        """Return whether nothing says how fast."""
+        return not {"rate_hz_per_s", "ramp_seconds", "rates"} & set(given)
 
     def runs(self, scene: Scene) -> list[tuple[Ramp, ...]]:
         """Return what is to be run through at each rate; SettingError names what is wrong."""

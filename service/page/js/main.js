@@ -17,7 +17,7 @@ import { startShape } from "./shape/card.js";
 import { hasOwnView, STUDIES, viewOf, VIEWS } from "./views.js";
 import { startAnswer } from "./views/answer.js";
 import { showResponse, startLive, wishFirst } from "./views/live.js";
-import { showOther, startOthers } from "./views/others.js";
+import { showOther, startQuestions } from "./views/questions.js";
 import { startRenewal, startStudy } from "./views/study.js";
 import { response } from "./views/response.js";
 import { placeCards, startViews } from "./views/view.js";
@@ -222,7 +222,7 @@ async function start() {
   for (const begins of [startTabs, startProjects, startRunList, startRuns, startRunsTable, startComparison, startLive]) begins();
   startViews(VIEWS);
   startShape((at) => ({ ...asked(), frequency_hz: at }));
-  for (const begins of [startOthers, startSettings, startRenewal, startAnswer, startStudy, startFrame]) begins();
+  for (const begins of [startQuestions, startSettings, startRenewal, startAnswer, startStudy, startFrame]) begins();
   controls();
   on("states", (found) => {
     states = found;

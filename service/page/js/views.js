@@ -1,5 +1,6 @@
 // The views of the page in the order of their cards: a further one is its file and a line here. Those of the lab stand
-// in its folders (`view.js`). The card “Other studies” has a form and a view for every other kind the service knows.
+// in its folders (`view.js`). Every kind the service knows is a question in a card, that of one
+// without a view of its own shows its result too.
 
 import { identify } from "./identify/view.js";
 import { LAB } from "./lab.js";
@@ -17,11 +18,10 @@ import { response } from "./views/response.js";
 export const VIEWS = [response, problem, design, map, front, margin, ...LAB, campbell, interference, point, timeMarch, modes, identify];
 
 // The tabs that cards stand under; all of them stand under the last.
-export const TABS = [["response", "Response"], ["map", "Map"], ["design", "Design"], ["disk", "Disk"], ["modes", "Modes"], ["identify", "Identification"], ["accuracy", "Accuracy"], ["runs", "Runs"], ["all", "All"]];
+export const TABS = [["response", "Response"], ["design", "Design"], ["disk", "Disk"], ["modes", "Modes"], ["identify", "Identification"], ["studies", "Studies"], ["map", "Map"], ["accuracy", "Accuracy"], ["runs", "Runs"], ["all", "All"]];
 
 // Those that show a kind of job in a card of their own.
 export const STUDIES = VIEWS.filter(({ kind, title }) => kind && title);
-
 export const viewOf = (kind) => VIEWS.find((view) => view.kind === kind);
 
 // Whether a kind is shown elsewhere than among the other studies.

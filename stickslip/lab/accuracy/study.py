@@ -11,7 +11,7 @@ from service.jobs.common.result_models import answered
 from service.jobs.common.scene_requests import FrequencyHz, Harmonics, check
 from service.jobs.stored_figures import SweepRecord
 from service.jobs.kind_registry import Flag
-from service.jobs.study import Study
+from service.jobs.study import Question, Study
 from solver.errors import Issue
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ class Accuracy(Study):
     EXAMPLES = ({"scene": "two-dof", "frequency_hz": 1.2, "harmonics": [1, 3, 7], "samples": [64]},)
     NAME, FUNCTION = "accuracy", "solver:accuracy_study"
     RESULT = answered("stickslip.lab.accuracy.accuracy_result:AccuracyStudy", "AccuracyResult")
+    ASKS = Question("How many harmonics are enough?", "checks", 40_000)
     TOLD = "stickslip.lab.accuracy.tables:accuracy"
     SHOWS, SWEEPS, COUNTED = (
         "error against time ([accuracy](accuracy.md))",

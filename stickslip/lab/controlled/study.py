@@ -13,7 +13,7 @@ from service.jobs.common.scene_requests import FrequencyHz, HarmonicRequest, Pos
 from service.jobs.common.sizes import balance_issues
 from service.jobs.common.study_keys import band_issues
 from service.jobs.kind_registry import Flag
-from service.jobs.study import Answer, Study, Watch
+from service.jobs.study import Answer, Proposed, Question, Study, Watch
 from solver.errors import Issue
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ class Controlled(Study, HarmonicRequest):
         changes=list[Table],
         least=Table | None,
     )
+    ASKS = Question("What would a test at held amplitude show?", "rig", 5_000)
     TOLD = "solver.views.tables.disks:held"
     SHOWS = "force and phase over the frequency ([a held amplitude](modes.md#a-held-amplitude))"
     EMPTY = ("frequency", "no response with this amplitude was found")
@@ -56,6 +57,14 @@ class Controlled(Study, HarmonicRequest):
     no_stability: Annotated[bool, Field(strict=True)] = Field(
         default=False, description="Leave out whether responses are stable: faster."
     )
+
+    @classmethod
+    def propose(cls, scene: Scene) -> Proposed | str:
+        """A quarter of the highest peak of the response, held."""
+        forces = [force for force in scene.excitation if force.amplitude != 0.0]
+        if not forces or any(force.harmonic != 1 for force in forces):
+            return "It holds the amplitude by an excitation of harmonic 1 alone."
+        return Proposed(of_peak={"amplitude": 0.25})
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with range and DOF for the scene."""

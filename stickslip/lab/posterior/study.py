@@ -23,7 +23,7 @@ from service.jobs.common.scene_requests import (
 )
 from service.jobs.kind_registry import Flag, JobKind, Json, Resolved, SceneSource
 from service.jobs.studies.identify_study import MOST_TABLES, Measured
-from service.jobs.study import Answer, Watch
+from service.jobs.study import Answer, Question, Watch
 from solver.errors import Issue
 
 if TYPE_CHECKING:
@@ -75,6 +75,7 @@ class PosteriorStudy(Measured):
         "unknowns": {"damper.mu": [0.1, 0.6]},
     },)  # fmt: skip
     NAME, FUNCTION, RESULT = "posterior", "optim:posterior", posterior_result
+    ASKS = Question("How sure are the values of my measurements?", "rig")
     TOLD, COUNTED = "stickslip.lab.posterior.tables:told", "places"
     SHOWS = "samples with intervals and evidence ([identification](identification.md#the-posterior-and-how-well-a-model-explains-the-data))"  # noqa: E501 - a link
     GROUPED: ClassVar = {"sampling": "optim:Sampling"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import cache, partial
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,13 +14,15 @@ from service.jobs.common.result_models import answered
 from service.jobs.common.scene_requests import LEAST, FrequencyHz, HarmonicRequest, Number, check
 from service.jobs.common.sizes import balance_issues
 from service.jobs.kind_registry import Flag, Json
-from service.jobs.study import Answer, Study, Watch
+from service.jobs.study import Answer, Proposed, Question, Study, Watch, middle_hz, rounded
 from solver.errors import Issue
 
 if TYPE_CHECKING:
     from solver.results.told import Told
     from solver.scene.scene import Scene
 
+_SIZES = ((7, 90), (5, 60), (3, 40))  # harmonics and turns: of these the first that is not too large
+_APART = 1.3  # the ratio of the frequencies that is proposed: both repeat after ten turns
 _RESPONSES = 7  # of long periods, at most as many as that
 
 
@@ -48,6 +51,7 @@ class QuasiPeriodicStudy(Study, HarmonicRequest):
 
     EXAMPLES = ({"scene": "two-dof", "frequency_hz": 1.05, "second_hz": 1.3821, "amplitude": 60},)
     NAME, FUNCTION, RESULT = "quasi-periodic", "solver:quasi_periodic", quasi_periodic_result
+    ASKS = Question("What if two forces act at once?", "engine", 27_000)
     TOLD = "stickslip.lab.quasi_periodic.tables:quasi_periodic"
     SHOWS = "the response to two frequencies ([two base frequencies](transients.md#two-base-frequencies))"
     FIGURE = "stickslip.lab.quasi_periodic.pictures:torus_drawn"
@@ -85,6 +89,22 @@ class QuasiPeriodicStudy(Study, HarmonicRequest):
     tolerance: Annotated[float, Field(strict=True, ge=LEAST, le=0.1), Flag(metavar="E")] = Field(
         default=2e-3, description="Change by longer periods, relative, at which they are long enough."
     )
+
+    @classmethod
+    def propose(cls, scene: Scene) -> Proposed | str:
+        """A second force as large as half the first, in no ratio of whole numbers to it: both are assumed."""
+        first = next((one for one in scene.excitation if one.amplitude), None)
+        if first is None:
+            return "The scene has no excitation."
+        middle = middle_hz(scene)
+        harmonics, turns = next(
+            pair for pair in _SIZES if pair is _SIZES[-1] or not balance_issues("", scene, math.prod(pair), 1)
+        )
+        body = {
+            "frequency_hz": middle, "second_hz": rounded(middle * _APART, 5),
+            "amplitude": rounded(abs(first.amplitude) / 2.0), "harmonics": harmonics, "turns": turns,
+        }  # fmt: skip
+        return Proposed(body, ("second_hz", "amplitude"))
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with frequencies, force and lengths."""

@@ -14,7 +14,7 @@ from service.jobs.common.result_models import Curve, Table, answered
 from service.jobs.common.scene_requests import HarmonicRequest, NotNegative, Number, PositiveNumber, check
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_registry import Flag
-from service.jobs.study import Answer, Study, Watch
+from service.jobs.study import Answer, Proposed, Question, Study, Watch
 from solver.errors import Issue
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 _OF_A_CHOICE = ("parameter", "start", "stop", "from_hours", "factors", "looks")
 _OF_A_LIFE = ("limit", "paths", "points", "tolerance")
 _CHOOSING, _CLOSING = 0.8, 10  # share of the time of a choice, and lives that close in on it
+_HOURS, _COEFFICIENT, _AREA = 1000.0, 1e-14, 1e-4  # are proposed
 _STEPS = 20  # over the hours, each with a look at the whole band
 _OfContacts = list[Curve]
 _Block = Annotated[list[PositiveNumber], Field(min_length=2, max_length=2)]
@@ -49,6 +50,7 @@ class Wear(Study, HarmonicRequest):
         "stickslip.lab.wear_life.life_result:WearLife", "WearResult", depths=_OfContacts, loads=_OfContacts,
         power=_OfContacts, depth_slopes=_OfContacts, chosen=_CHOSEN,
     )  # fmt: skip
+    ASKS = Question("How does it wear?", "life", 40_000)
     TOLD = "stickslip.lab.wear_life.tables:wear_life"
     SHOWS, COUNTED = "depths, loads and amplitude over hours ([wear](wear.md#wear-over-life))", "responses"
     GROUPED: ClassVar = {"mission": "solver:Mission", "wear": "solver:WearLaw"}
@@ -114,6 +116,20 @@ class Wear(Study, HarmonicRequest):
     looks: Annotated[int, Field(strict=True, ge=3, le=1000), Flag(metavar="N")] = Field(
         default=9, description="Values over the range that the choice begins with."
     )
+
+    @classmethod
+    def propose(cls, scene: Scene) -> Proposed | str:
+        """A thousand hours; coefficient and area of its contacts are assumed, and what a depth takes as well
+        where the contact has no normal stiffness."""
+        rubbing = {c.group or c.name: c for c in scene.contacts if c.load is not None and hasattr(c, "mu")}
+        if not rubbing:
+            return "The scene has no contact that rubs and wears."
+        stiff = {name: getattr(c, "kt", 0.0) for name, c in rubbing.items() if not getattr(c, "kn", None)}
+        assumed = {
+            "coefficient": dict.fromkeys(rubbing, _COEFFICIENT), "area": dict.fromkeys(rubbing, _AREA),
+            **({"load_loss_per_depth": stiff} if stiff else {}),
+        }  # fmt: skip
+        return Proposed({"hours": _HOURS, **assumed}, ("hours", *assumed))
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with contacts, frequencies and paths, and with what is chosen."""

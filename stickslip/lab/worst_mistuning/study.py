@@ -13,8 +13,8 @@ from service.jobs.common.scene_requests import LEAST, FrequencyHz, HarmonicReque
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.common.study_keys import band_issues
 from service.jobs.kind_registry import Flag
-from service.jobs.studies.mistuning_study import PartNames, disk_issues, part_issues
-from service.jobs.study import Study
+from service.jobs.studies.mistuning_study import PartNames, blades_differ, disk_issues, part_issues
+from service.jobs.study import Proposed, Question, Study
 from solver.errors import Issue
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ class WorstMistuningStudy(Study, HarmonicRequest):
         "stickslip.lab.worst_mistuning.worst_result:WorstMistuning", "WorstMistuningResult",
         worst=Table | None, residual=Table | None, patterns=list[Table],
     )  # fmt: skip
+    ASKS = Question("What is the worst pattern of blades?", "engine", 300_000)
     TOLD = "stickslip.lab.worst_mistuning.tables:worst_mistuning"
     SHOWS = "the worst pattern with its bounds, and intentional ones ([patterns](disks.md#the-worst-pattern))"
     COUNTED = "climbs and responses"
@@ -93,6 +94,12 @@ class WorstMistuningStudy(Study, HarmonicRequest):
     stop: Annotated[FrequencyHz | None, Flag(metavar="F")] = Field(
         default=None, alias="to", description="Highest frequency [Hz]; the scene's band."
     )
+
+    @classmethod
+    def propose(cls, scene: Scene) -> Proposed | str:
+        """Return what the blades are told apart by, contacts in their linear limit: solved takes hours."""
+        told = blades_differ(scene)
+        return told if isinstance(told, str) else told._replace(body={**told.body, "contacts": "stuck"})
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return why it is no disk, and what is wrong with DOF, range and bounds."""

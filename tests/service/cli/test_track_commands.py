@@ -64,3 +64,25 @@ def test_contacts_without_second_derivatives_are_mapped_but_not_tracked(
     found = json.loads(capsys.readouterr().out)
     assert found["ridge"] is None
     assert None not in found["amplitude"][0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ("margin two-dof --points 2 --harmonics 3", "excitation"),
+        ("peaks two-dof --checks 0 --harmonics 3", "least peak"),
+        ("controlled two-dof --harmonics 3", "least force"),
+    ],
+)
+def test_what_is_left_out_is_what_the_scene_suggests(
+    arguments: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments.split()) == 0
+    out, err = capsys.readouterr()
+    assert said in out
+    assert err == ""
+
+
+def test_a_study_that_a_scene_has_nothing_for_says_why(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["mistuning", "two-dof"]) == 2
+    assert "is not for `mistuning`: The scene is one blade" in capsys.readouterr().err

@@ -1,7 +1,6 @@
 // Elements without markup in strings: data reaches the document as text only.
 
 const SVG = "http://www.w3.org/2000/svg";
-
 const present = (children) => children.flat(Infinity).filter((child) => child !== null && child !== undefined);
 
 export function el(tag, attributes = {}, ...children) {
@@ -24,7 +23,6 @@ export function svg(tag, attributes = {}, ...children) {
 }
 
 export const byId = (id) => document.getElementById(id);
-
 export const show = (node, ...children) => node.replaceChildren(...present(children));
 
 // Shows anew what has the focus: it stays where it was, by `data-focus`.

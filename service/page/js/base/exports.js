@@ -68,7 +68,6 @@ function underlay(copy, canvas) {
 }
 
 export const paperColour = () => getComputedStyle(document.querySelector(".card")).backgroundColor;
-
 export const svgText = (drawing, canvas) => new XMLSerializer().serializeToString(standalone(drawing, canvas));
 
 export async function pngBlob(drawing, canvas) {

@@ -49,11 +49,8 @@ export const length = (metres) => measured(metres, "m");
 export const hertz = (value) => measured(value, "Hz");
 
 export const unitOf = (path) => UNITS.get(path) ?? (path.startsWith("structure.") ? "" : UNITS.get(path.split(".").pop()) ?? "");
-
 export const withUnit = (path) => (unitOf(path) ? `${path} [${unitOf(path)}]` : path);
-
 export const quantity = (path, value) => measured(value, unitOf(path));
-
 export const seconds = (value) => measured(value, "s", null, 3);
 
 // Of today the time alone, over 24 hours.
@@ -65,7 +62,6 @@ export function when(text) {
 }
 
 export const percent = (share) => `${Math.round(100 * share)} %`;
-
 export const largest = (values) => values.reduce((most, v) => (Math.abs(v) > most ? Math.abs(v) : most), 0);
 
 // A factor for every number that is known.
@@ -76,7 +72,6 @@ export const valuesSaid = (values) => Object.entries(values).map(([path, value])
 
 // The place of the number that is nearest to another.
 export const nearestIn = (values, wanted) => values.reduce((best, value, i) => (Math.abs(value - wanted) < Math.abs(values[best] - wanted) ? i : best), 0);
-
 const RELIABLE = 0.03;
 
 const span = (ms) => {

@@ -5,7 +5,6 @@ export const FIRST_TAB = "response";
 const KIND = /^[a-z][a-z0-9-]{0,31}$/;
 const ID = /^[0-9a-f-]{36}$/;
 const USUAL_HARMONICS = 11;
-
 const plain = { read: (word) => word ?? "", write: (value) => value };
 
 // How each word of the address is read, and what is written where it says something. Every other word is the name of a

@@ -72,9 +72,7 @@ export function chart(host, { label, file, height = 300, onPick, legend = true }
 
 // The line that is read and picked from is the first.
 const lineOf = ({ shown }) => shown?.series[0];
-
 const pointOf = (self, at = self.at) => ({ x: lineOf(self).x[at], y: lineOf(self).y[at] });
-
 const wordsOf = ({ shown }, { x, y }, at) => shown.describe?.(x, y, at) ?? `${shown.x.name}: ${number(x, 6)} · ${shown.y.name}: ${number(y, 5)}`;
 
 function ends(axis, lists) {
@@ -170,16 +168,10 @@ function curve(line, base) {
 function limitLine({ x, y, name }, { box, xs, ys }) {
   if (x !== undefined) {
     const at = xs.at(x);
-    return [
-      svg("line", { class: "limit", x1: at, x2: at, y1: box.top, y2: box.bottom }),
-      svg("text", { class: "halo", x: at + 4, y: box.top + 12 }, name),
-    ];
+    return [svg("line", { class: "limit", x1: at, x2: at, y1: box.top, y2: box.bottom }), svg("text", { class: "halo", x: at + 4, y: box.top + 12 }, name)];
   }
   const at = ys.at(y);
-  return [
-    svg("line", { class: "limit", x1: box.left, x2: box.right, y1: at, y2: at }),
-    svg("text", { class: "halo", x: box.right - 4, y: at - 5, "text-anchor": "end" }, name),
-  ];
+  return [svg("line", { class: "limit", x1: box.left, x2: box.right, y1: at, y2: at }), svg("text", { class: "halo", x: box.right - 4, y: at - 5, "text-anchor": "end" }, name)];
 }
 
 function marked({ x, y, text, shape: kind = "circle", colour = 2 }, { box, xs, ys }) {
@@ -187,10 +179,7 @@ function marked({ x, y, text, shape: kind = "circle", colour = 2 }, { box, xs, y
   const share = (px - box.left) / (box.right - box.left);
   const anchor = share < 0.25 ? "start" : share > 0.75 ? "end" : "middle";
   const above = py - 10 > box.top + 4;
-  return [
-    shape(kind, px, py, 4.5, colour, text),
-    text ? svg("text", { class: "halo", x: px, y: above ? py - 10 : py + 20, "text-anchor": anchor }, text) : null,
-  ];
+  return [shape(kind, px, py, 4.5, colour, text), text ? svg("text", { class: "halo", x: px, y: above ? py - 10 : py + 20, "text-anchor": anchor }, text) : null];
 }
 
 const LETTER = 6.4;
@@ -246,11 +235,7 @@ function moveCursor(self, index, read) {
   self.at = next;
   const { x, y } = pointOf(self);
   const [px, py] = [self.xs.at(x), self.ys.at(y)];
-  show(
-    self.mark,
-    svg("path", { class: "cursor", d: `M${px} ${self.box.top}V${self.box.bottom}M${self.box.left} ${py}H${self.box.right}` }),
-    shape("circle", px, py, 4, 7),
-  );
+  show(self.mark, svg("path", { class: "cursor", d: `M${px} ${self.box.top}V${self.box.bottom}M${self.box.left} ${py}H${self.box.right}` }), shape("circle", px, py, 4, 7));
   self.share(x);
   read.setAttribute("aria-live", "polite");
   read.textContent = wordsOf(self, { x, y }, self.at);
@@ -298,5 +283,4 @@ const columnsOf = (shown) =>
   });
 
 const inMetres = ({ name, unit }) => (unit ? name.replace(`[${unit.name}]`, "[m]") : name);
-
 const metres = ({ unit }, values) => (unit ? values.map((v) => (v === null ? null : Number((v / unit.perMetre).toPrecision(15)))) : values);

@@ -6,10 +6,7 @@ import { hertz, largest, length, number, shownUnit, times } from "../base/format
 function byStability({ amplitude, unstable }) {
   if (!unstable?.length) return { stable: amplitude, unstable: null };
   const inside = (i, more) => unstable.some(([first, last]) => i >= first - more && i <= last + more);
-  return {
-    stable: amplitude.map((a, i) => (inside(i, 0) ? null : a)),
-    unstable: amplitude.map((a, i) => (inside(i, 1) ? a : null)),
-  };
+  return { stable: amplitude.map((a, i) => (inside(i, 0) ? null : a)), unstable: amplitude.map((a, i) => (inside(i, 1) ? a : null)) };
 }
 
 // The points of a response with its polished peak among them, which lies between two of them: the curve goes through it.
@@ -54,7 +51,6 @@ export function responseOf(answer, more = []) {
 
 const COLOURS = 6;
 export const seriesColour = (i) => 1 + (i % COLOURS);
-
 export const known = (rows) => rows.flat().filter((value) => value !== null);
 
 // An amplitude in the length that suits it, a stress in MPa, anything else as it is.

@@ -81,12 +81,7 @@ export function heatmap(host, { label, file, height = 340, onPick }) {
   return self;
 }
 
-const pointOf = ({ shown, row, column }) => ({
-  x: shown.x.values[column],
-  y: shown.y.values[row],
-  value: shown.rows[row][column],
-});
-
+const pointOf = ({ shown, row, column }) => ({ x: shown.x.values[column], y: shown.y.values[row], value: shown.rows[row][column] });
 const rising = bisector((value) => value);
 const falling = bisector((value) => -value);
 

@@ -8,12 +8,7 @@ const MARGIN = { left: 62, right: 14, top: 12, bottom: 44 };
 const PIXELS_A_TICK = { x: 72, y: 42 };
 
 export function plane(width, height, x, y, { paper = true, above = 0 } = {}) {
-  const box = {
-    left: MARGIN.left,
-    right: Math.max(width - MARGIN.right, MARGIN.left + 20),
-    top: MARGIN.top + above,
-    bottom: height - MARGIN.bottom,
-  };
+  const box = { left: MARGIN.left, right: Math.max(width - MARGIN.right, MARGIN.left + 20), top: MARGIN.top + above, bottom: height - MARGIN.bottom };
   const xs = { ...scale(x.log, x.low, x.high, box.left, box.right), whole: x.whole, names: x.names };
   const ys = scale(y.log, y.low, y.high, box.bottom, box.top);
   const frame = svg(
@@ -23,11 +18,7 @@ export function plane(width, height, x, y, { paper = true, above = 0 } = {}) {
     gridLines(box, xs, ys, paper),
     svg("path", { class: "axis", d: `M${box.left} ${box.top}V${box.bottom}H${box.right}` }),
     svg("text", { x: (box.left + box.right) / 2, y: height - 8, "text-anchor": "middle" }, x.name),
-    svg(
-      "text",
-      { transform: `translate(14 ${(box.top + box.bottom) / 2}) rotate(-90)`, "text-anchor": "middle" },
-      y.name,
-    ),
+    svg("text", { transform: `translate(14 ${(box.top + box.bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, y.name),
   );
   return { box, xs, ys, frame };
 }

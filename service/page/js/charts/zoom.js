@@ -34,7 +34,6 @@ function look(self, window) {
 }
 
 const seen = ({ drawing }) => drawing.getClientRects().length > 0;
-
 const linked = (self) => [...charts].filter((each) => each === self || (each.shown && each.shown.x.name === self.shown?.x.name && seen(each)));
 
 function around(self, factor, at) {
@@ -48,9 +47,7 @@ function around(self, factor, at) {
 }
 
 const toFrom = (log) => (log ? [Math.log, Math.exp] : [(v) => v, (v) => v]);
-
 const isPressed = (node) => node.getAttribute("aria-pressed") === "true";
-
 const zoomButton = (label) => (sign, words, act) => button(sign, act, { "aria-label": `${label}: ${words}`, title: words });
 
 export function zoomButtons(self, label) {

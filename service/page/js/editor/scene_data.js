@@ -3,7 +3,6 @@
 import { keyOf, keysOf, oneOf, requiredKeys, sectionsOf } from "./schema.js";
 
 const ENDS = /^(between|between_second|normal_between)$/;
-
 export const escaped = (key) => String(key).replaceAll("~", "~0").replaceAll("/", "~1");
 
 // Matrices and what came of them are kept as they are: nobody edits them number by number.

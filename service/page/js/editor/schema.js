@@ -22,7 +22,6 @@ export async function loadSchema() {
 }
 
 const resolved = (node) => (node?.$ref ? { ...schema.$defs[node.$ref.split("/").pop()], ...(node.description ? { description: node.description } : {}) } : node);
-
 const at = (node, key) => resolved(resolved(node)?.properties?.[key]);
 
 // The table or list of tables at a path of keys: `structure/springs`.
@@ -113,11 +112,8 @@ export function keysOf(scene, path, row) {
 }
 
 export const requiredKeys = (scene, path, row) => rowSchema(scene, path, row)?.required ?? [];
-
 export const titleOf = (path) => TITLES[path] ?? path.split("/").pop().replaceAll("_", " ");
-
 export const oneOf = (path) => ONE[path] ?? `row of ${titleOf(path).toLowerCase()}`;
-
 export const wordsOf = (scene, path) => (path === "" ? "" : nodeOf(scene, path)?.description ?? "");
 
 // The sections that a scene of its kind can have: fields, rows of a list, or rows of a table of names.

@@ -11,9 +11,7 @@ const MOST = 26;
 // What a row is: these have a column even where they are left out.
 const TELLING = ["law", "shape", "kind"];
 let opened = new Map();
-
 export const forgetOpened = () => { opened = new Map(); };
-
 const openedIn = (path) => opened.get(path) ?? opened.set(path, new Set()).get(path);
 
 // A value that is said to be missing gets a column.
@@ -57,7 +55,6 @@ function widthOf(rows, known) {
 const COPY = "M3 5.5h7.5V13H3zM5.5 5.5V3H13v7.5h-2.5";
 const CROSS = "M4 4l8 8M12 4l-8 8";
 const icon = (path) => svg("svg", { viewBox: "0 0 16 16", width: 15, height: 15, "aria-hidden": "true", fill: "none", stroke: "currentColor", "stroke-width": 1.4 }, svg("path", { d: path }));
-
 const nameOf = (path, { row, name, index }) => name ?? asTable(row).name ?? `${oneOf(path)} ${index + 1}`;
 
 // A value that no field can show: a table of tables, a matrix.
@@ -183,11 +180,8 @@ function moreKeys(scene, path, row, shown, edit, index) {
 }
 
 const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
-
 export const idOf = (pointer) => `field${pointer.replaceAll(/[^A-Za-z0-9]/g, "-")}`;
-
 const plainList = (value) => Array.isArray(value) && value.every((one) => one === null || typeof one !== "object");
-
 const plainTable = (value) => value !== null && typeof value === "object" && !Array.isArray(value) && Object.values(value).every((one) => one === null || typeof one !== "object");
 
 // A value in the words of its field.

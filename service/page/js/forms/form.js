@@ -28,7 +28,6 @@ function gathered(nodes) {
 
 // Whether a field says something else than what holds without it.
 const isFilled = ({ type, checked, value, dataset }) => (type === "checkbox" ? checked !== (dataset.usual === "true") : value !== "" && value !== (dataset.usual ?? ""));
-
 const merged = (before, value) => (before && typeof value === "object" && !Array.isArray(value) ? { ...before, ...value } : value);
 
 // Whether an error could be said at a part.

@@ -7,7 +7,6 @@ import { boundsTold, listBody, listColumns, listRow, namesOfTable, rowsOf, rowsO
 import { hintOf, readField, written } from "./fields.js";
 
 const framed = ({ label, words }, ...content) => el("fieldset", {}, el("legend", { title: words }, label), note(words), content);
-
 const one = ({ label }) => label.replace(/s$/, "");
 
 // The rows of a table by paths, with those that stand beside it.

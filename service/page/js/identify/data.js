@@ -113,9 +113,7 @@ export function clearData() {
 }
 
 export const tables = () => files.map(({ table }) => table);
-
 export const sourceNames = () => files.map(({ name }) => name);
-
 export const runsRead = () => files.flatMap(({ runs }) => runs);
 
 // The data of a job that was asked before, as tables without their text.
@@ -140,9 +138,7 @@ export function list() {
 const KEPT = "stickslip-columns";
 const SEPARATORS = { ";": "semicolons", "\t": "tabs", ",": "commas", "|": "bars" };
 const SIZES = ["amplitude", "max_abs", "half_peak_to_peak"];
-
 const kept = () => JSON.parse(localStorage.getItem(KEPT) ?? "{}");
-
 const nameOf = ({ columns }) => columns.map(({ heading }) => heading).join("\u0000");
 
 // One export after the other in `host`; `read(layout, columns)` says whether nothing was wrong with it.

@@ -40,6 +40,7 @@ export const identify = view({
     startData(() => {
       list();
       draw(null);
+      tell("measured");
     });
     on("resubmit", (kind) => kind === "identify" && byId("identify-form").requestSubmit());
   },

@@ -31,7 +31,6 @@ export function setKey(value) {
 }
 
 export const pause = (seconds) => new Promise((resolve) => setTimeout(resolve, seconds * 1000));
-
 const authorised = (headers) => (key() ? { ...headers, Authorization: `Bearer ${key()}` } : headers);
 
 // What is changed must be as it was known.
@@ -42,12 +41,7 @@ export async function fetched(path, { method = "GET", body, raw, headers = {}, s
   const sent = body === undefined ? {} : { "Content-Type": "application/json" };
   let answer;
   try {
-    answer = await fetch(path, {
-      method,
-      headers: authorised({ ...sent, ...headers }),
-      body: raw ?? (body === undefined ? undefined : JSON.stringify(body)),
-      signal,
-    });
+    answer = await fetch(path, { method, headers: authorised({ ...sent, ...headers }), body: raw ?? (body === undefined ? undefined : JSON.stringify(body)), signal });
   } catch (error) {
     if (error.name === "AbortError") throw error;
     lost();

@@ -4,7 +4,6 @@ import { patiently, pause, post } from "./api.js";
 
 const LONGEST_PAUSE = 5;
 const AT_A_TIME = 2;
-
 const session = Math.random().toString(36).slice(2, 10);
 
 export function previewer(purpose, onAnswer, onError) {

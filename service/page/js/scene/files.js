@@ -11,7 +11,6 @@ const LONGEST_NAME = 200;
 
 // The name as the service takes it: letters, digits and what is usual between them.
 const plainName = (name) => name.replaceAll(/[^A-Za-z0-9_.\- ]/g, "_").replace(/^[^A-Za-z0-9_]+/, "").slice(-LONGEST_NAME) || "matrices";
-
 const size = (bytes) => (bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toPrecision(3)} MB`);
 
 // Stores a file, a large one in parts; one that is too large is not sent at all.
@@ -125,7 +124,6 @@ export function matrixFiles(host, changed) {
 }
 
 const REFERS = /^\s*(?:M|K|C|G|K_omega2|modes|mapping|diameters|nodes)\s*=\s*"(?!upload:)([^"\n]+)"|[{,]\s*nodes\s*=\s*"(?!upload:)([^"\n]+)"|"(?:M|K|C|G|K_omega2|modes|mapping|diameters|nodes)"\s*:\s*"(?!upload:)([^"\n]+)"/gm;
-
 const ownName = (path) => path.split(/[\\/]/).pop();
 
 // Every file of what was dropped, those in folders too.

@@ -7,7 +7,6 @@ import { givenByScene, variable, variables } from "./scenes.js";
 
 const USUAL_HARMONICS = 11;
 const CLOSE = 1e-9;
-
 const same = (a, b) => a === b || Math.abs(a - b) <= CLOSE * Math.max(Math.abs(a), Math.abs(b));
 
 // The paths that a study varies itself: what they are set to does not matter to it.

@@ -21,9 +21,7 @@ export async function loadKinds() {
 }
 
 export const kindNames = () => [...kinds.keys()];
-
 export const kindOf = (name) => kinds.get(name);
-
 const keyed = (name, key) => kinds.get(name)?.fields.find((field) => field.key === key);
 
 // Whether a kind is asked with a number of harmonics.
@@ -43,20 +41,19 @@ export function ofTheBar(name) {
   return keyed(name, "parameter")?.required ? { parameter: variable(), from, to } : {};
 }
 
-const proposal = (name) => current.studies?.get(name);
+// What the scene suggests for a kind: its question, its keys, what it takes, or why there is none.
+export const proposalOf = (name) => current.studies?.get(name);
 
 // The keys of a body that the scene itself suggests.
-export const proposed = (name) => proposal(name)?.body ?? {};
+export const proposed = (name) => proposalOf(name)?.body ?? {};
 
 // How long studies take, about [s]: what the service says each costs, at the price of a point that the plan of the
 // scene names. 0 where one is not known.
-export const secondsOf = (...names) => price * names.reduce((sum, name) => sum + (proposal(name)?.points ?? 0), 0);
-
+export const secondsOf = (...names) => price * names.reduce((sum, name) => sum + (proposalOf(name)?.points ?? 0), 0);
 export const takes = (...names) => (secondsOf(...names) ? `about ${seconds(secondsOf(...names))}` : "");
 
 // Why the scene has no such study; empty if it has.
-export const refusedFor = (name) => proposal(name)?.refused ?? "";
-
+export const refusedFor = (name) => proposalOf(name)?.refused ?? "";
 let laws = new Map();
 let usual = null;
 

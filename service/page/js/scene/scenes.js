@@ -6,9 +6,7 @@ import { learnUnits } from "../base/format.js";
 
 // What the service tells of it beside its tables: parameters by path, joints, what each study begins with.
 export const current = { body: null, parameters: new Map(), joints: [], studies: new Map() };
-
 const FORCE = "excitation";
-
 export const listScenes = () => everyItem("/v1/scenes");
 
 export async function loadScene(name) {
@@ -59,7 +57,6 @@ export const sliders = () => [...ranges(state.contact), ...ranges(FORCE)];
 
 // What may be designed.
 export const variables = () => [...current.parameters.values()].filter(({ bounds }) => bounds).map(({ path }) => path);
-
 const variablesOf = (part) => variables().filter((path) => current.parameters.get(path).part === part);
 
 // The path that is designed: the one chosen, else the first of the contact.
@@ -75,5 +72,4 @@ export function chooseVariable(path) {
 
 // What a request about this scene says.
 export const asked = () => ({ scene: state.scene, set: { ...state.set }, harmonics: state.harmonics });
-
 export const defaultRange = () => current.parameters.get(variable()).bounds;

@@ -11,7 +11,6 @@ const TILT = (22 * Math.PI) / 180;
 const DOT = 2.6;
 const PLATE = 11;
 const SIDEWAYS = 4;
-
 const times = (a, k) => a.map((value) => k * value);
 const plus = (a, b) => a.map((value, i) => value + b[i]);
 

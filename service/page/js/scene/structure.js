@@ -2,10 +2,13 @@
 
 import { el, note, numeric, show, svg, table } from "../base/dom.js";
 import { hertz, measured, number } from "../base/format.js";
-import { GROUND, chain, ownName, partsOf, ring } from "./layout.js";
 import { current, value } from "./scenes.js";
 import { drawSector } from "./sector.js";
 
+const GROUND = "ground";
+const MOST_SECTORS = 24;
+const SHOWN_OF_MANY = 3;
+const ownName = (end) => end.split("@")[0];
 export const STATES = {
   "stuck": ["is-stick", "sticks"],
   "closed": ["is-stick", "closed"],
@@ -18,7 +21,6 @@ export const STATES = {
 const WIDEST = 560;
 const NARROWEST = 320;
 const HEIGHT = 250;
-
 const classOf = (state) => STATES[state]?.[0] ?? "is-unknown";
 const wordsOf = (state) => STATES[state]?.[1] ?? "not computed yet";
 
@@ -52,12 +54,7 @@ const legend = () => el("ul", { class: "legend" }, stateKey(), el("li", {}, "dou
 // What the plates of a contact say.
 function stateKey() {
   const entry = (state, words) =>
-    el(
-      "li",
-      {},
-      svg("svg", { width: 30, height: 16, "aria-hidden": "true" }, plates({ x: 4, y: 8 }, { x: 26, y: 8 }, 11, classOf(state))),
-      ` ${words}`,
-    );
+    el("li", {}, svg("svg", { width: 30, height: 16, "aria-hidden": "true" }, plates({ x: 4, y: 8 }, { x: 26, y: 8 }, 11, classOf(state))), ` ${words}`);
   return [entry("stuck", "sticks"), entry("stick and slip", "sticks and slips"), entry("separated", "opens")];
 }
 
@@ -281,4 +278,92 @@ function push({ x, y, angle }, size) {
   const [fx, fy] = [bx + tx * 14, by + ty * 14];
   const [nx, ny] = [Math.cos(angle) * 3, Math.sin(angle) * 3];
   return svg("path", { class: "force", d: `M${fx} ${fy}L${bx} ${by}M${bx} ${by}l${tx * 6 + nx} ${ty * 6 + ny}l${-2 * nx} ${-2 * ny}Z` });
+}
+
+// Where parts are drawn: chains from the ground outwards, disks as rings of sectors.
+
+// Distance of every DOF from the ground over the springs; what hangs on contacts alone is one farther than its
+// neighbour, and what hangs on nothing comes last.
+function layersOf(dofs, springs, contacts) {
+  const layers = new Map([[GROUND, 0]]);
+  spread(layers, springs);
+  spread(layers, [...springs, ...contacts]);
+  let last = Math.max(...layers.values());
+  for (const dof of dofs) if (!layers.has(dof)) layers.set(dof, (last += 1));
+  return layers;
+}
+
+function spread(layers, joints) {
+  for (let more = true; more; ) {
+    more = false;
+    const found = new Map();
+    for (const { between } of joints) {
+      const [a, b] = between.map(ownName);
+      for (const [from, to] of [[a, b], [b, a]]) {
+        if (layers.has(from) && !layers.has(to)) found.set(to, Math.min(layers.get(from) + 1, found.get(to) ?? Infinity));
+      }
+    }
+    for (const [name, layer] of found) {
+      layers.set(name, layer);
+      more = true;
+    }
+  }
+}
+
+// What a scene's structure consists of, whatever its kind.
+function partsOf({ body: { structure, observe }, joints: contacts }) {
+  const masses = structure.masses ? Object.keys(structure.masses) : Object.keys(structure.dofs ?? {});
+  const used = [...contacts.flatMap((c) => c.between), observe.dof].map(ownName);
+  const dofs = masses.length ? masses : [...new Set(used)].filter((name) => name !== GROUND);
+  return {
+    dofs: dofs.map(ownName).filter((name, i, all) => all.indexOf(name) === i),
+    springs: structure.springs ?? [],
+    contacts,
+    sectors: structure.kind === "cyclic" ? structure.sectors : 1,
+    cyclic: structure.kind === "cyclic",
+    matrices: structure.kind === "matrices",
+  };
+}
+
+function chain(parts, width, height) {
+  const inOrder = new Map(parts.dofs.map((dof, i) => [dof, i + 1]));
+  const layers = parts.matrices ? inOrder : layersOf(parts.dofs, parts.springs, parts.contacts);
+  const above = parts.contacts.some((c) => !c.between.includes(GROUND)) ? 22 : 0;
+  const columns = new Map();
+  for (const dof of parts.dofs) {
+    const layer = layers.get(dof);
+    columns.set(layer, [...(columns.get(layer) ?? []), dof]);
+  }
+  const last = Math.max(...columns.keys(), 1);
+  const places = new Map();
+  for (const [layer, names] of columns) {
+    names.forEach((name, i) => {
+      const x = 54 + (layer / (last + 0.35)) * (width - 90);
+      places.set(name, { x, y: (height * (i + 1)) / (names.length + 1) - 18 + above });
+    });
+  }
+  const size = Math.min(24, (0.36 * (width - 90)) / (last + 1), (0.3 * height) / Math.max(...[...columns.values()].map((n) => n.length)));
+  return { places, size: Math.max(size, 5), ground: { x: 22 } };
+}
+
+// The places of sector j's DOFs on their rings; of very many sectors only the first few, widely fanned.
+function ring(parts, radius) {
+  const layers = layersOf(parts.dofs, parts.springs, parts.contacts);
+  const last = Math.max(...layers.values(), 1);
+  const all = parts.sectors <= MOST_SECTORS;
+  const shown = all ? parts.sectors : SHOWN_OF_MANY;
+  const step = all ? (2 * Math.PI) / Math.max(parts.sectors, 2) : Math.PI / 5;
+  const start = all ? -Math.PI / 2 : -Math.PI / 2 - step;
+  const inner = 0.3;
+  const place = (dof, j) => {
+    const share = inner + ((1 - inner) * (layers.get(dof) - 1)) / Math.max(last - 1, 1);
+    const angle = start + j * step;
+    return { x: radius * share * Math.cos(angle), y: radius * share * Math.sin(angle), angle };
+  };
+  const hub = (j) => {
+    const angle = start + j * step;
+    return { x: radius * 0.12 * Math.cos(angle), y: radius * 0.12 * Math.sin(angle), angle };
+  };
+  const size = Math.min(15, (0.3 * radius * (1 - inner)) / last, 0.32 * radius * inner * step + 4);
+  return { place, hub, shown, closed: all, size: Math.max(size, 3.5) };
 }

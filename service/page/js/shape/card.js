@@ -16,7 +16,6 @@ const KEYS = { ArrowLeft: [-0.15, 0], ArrowRight: [0.15, 0], ArrowUp: [0, 0.1], 
 const STATE_WORDS = [["is-stick", "sticks"], ["is-slip", "slips"], ["is-apart", "open"]];
 const NO_WEBGL = "This browser has no WebGL, with which shapes are drawn. The service tells them as numbers: its preview “shape”.";
 const still = matchMedia("(prefers-reduced-motion: reduce)");
-
 const angle = (step) => (2 * Math.PI * step) / STEPS;
 
 export function shapeCard(host, { id, file }) {

@@ -35,7 +35,6 @@ export function startAnswer() {
 }
 
 const key = () => JSON.stringify([state.scene, designed?.request.set ?? {}, designed?.request.harmonics ?? 11]);
-
 const known = () => before !== null && sameValues(before, designed.request);
 
 // The response that the design began with, where the sweep at hand is of other values.

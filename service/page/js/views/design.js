@@ -170,7 +170,6 @@ function startSensitivities() {
 
 // Values by paths of which several that share one are separated by commas, each by its own.
 const apart = (values) => Object.fromEntries(Object.entries(values).flatMap(([names, value]) => names.split(",").map((path) => [path.trim(), value])));
-
 const percent = (share) => numeric(share === null ? "–" : `${share > 0 ? "+" : share < 0 ? "−" : ""}${number(Math.abs(share), 3)} %`);
 
 function drawSensitivities({ peaks, rows, left_out: without, band_hz: band, limit, n_harmonics: kept, status, reached }) {

@@ -73,7 +73,6 @@ function refresh() {
 }
 
 const valuesNow = () => JSON.stringify([state.scene, asked()]);
-
 const wish = (harmonics) => ask({ kind: "sweep", ...asked(), harmonics }, { scene: state.scene, values: valuesNow(), harmonics });
 
 // What is too large to be followed live is computed by a job, whose response takes the place of this one.
@@ -105,7 +104,6 @@ const words = ({ peak, band_hz: band, status, peak_certificate: certificate }) =
 
 // What the sliders are set to: the response that follows them, or that of the study where it is of the same values.
 const ofStudy = () => study?.answer && sameValues(study.request, { set: state.set, harmonics: state.harmonics });
-
 const shown = () => (ofStudy() ? study.answer : latest);
 
 const lineOf = (answer, look) => {

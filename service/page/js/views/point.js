@@ -50,7 +50,6 @@ export const point = view({
 });
 
 const typed = () => go(byId("point-at").valueAsNumber);
-
 const wish = () => JSON.stringify([state.scene, state.set, state.harmonics, state.at]);
 
 function go(frequency, again = false) {
@@ -124,11 +123,7 @@ function drawHistory() {
   const series = [{ name: "balance", ...line(time, displacement), colour: 1 }];
   const other = march?.history;
   if (other) series.push({ name: "time march", ...line(some(other.time), some(other.displacement)), colour: 2, width: 0, shape: "circle", size: 3 });
-  plots.history.draw({
-    x: { name: `time [${word}]` },
-    y: { name: `${current.body.observe.dof} [${unit.name}]`, unit, pad: 0.06 },
-    series,
-  });
+  plots.history.draw({ x: { name: `time [${word}]` }, y: { name: `${current.body.observe.dof} [${unit.name}]`, unit, pad: 0.06 }, series });
 }
 
 function drawLoop() {

@@ -103,7 +103,6 @@ function limitWords(body) {
 }
 
 const joined = (nodes) => nodes.flatMap((node, i) => (i === 0 ? [node] : [i === nodes.length - 1 ? " and " : ", ", node]));
-
 const HOW = { "± share": "deviation", "± value": "absolute_deviation" };
 
 function intervalOf({ path, how, from, to }) {
@@ -120,7 +119,6 @@ function rowOf([path, how]) {
 }
 
 const isListed = (uncertain) => uncertain && !Array.isArray(uncertain) && Object.values(uncertain).every((how) => Array.isArray(how) || "deviation" in Object(how) || "absolute_deviation" in Object(how));
-
 const wordsOf = (uncertain) => (Array.isArray(uncertain) ? `${uncertain.length} samples` : `an ellipsoid of ${Object.keys(uncertain.centre ?? uncertain.half_axes ?? {}).join(", ") || "deviations"}`);
 
 // The part of a form for the key `uncertain`, whose schema takes any table.

@@ -6,7 +6,7 @@ import { on, state, tell, write } from "../base/state.js";
 import { schemaForm } from "../forms/form.js";
 import { run } from "../network/jobs.js";
 import { differences } from "../scene/inputs.js";
-import { askedFor, ofTheBar, proposed, refusedFor, takes } from "../scene/kinds.js";
+import { askedFor, ofTheBar, proposed, refusedFor, secondsOf, takes } from "../scene/kinds.js";
 import { variable } from "../scene/scenes.js";
 import { readSettings } from "../scene/settings.js";
 import { STUDIES, viewOf } from "../views.js";
@@ -16,9 +16,14 @@ import { complaining } from "./view.js";
 
 // Where a tab is about one study, the button of the bar is that of its form.
 const ofTab = () => STUDIES.find(({ bar, tabs }) => bar && tabs === state.tab);
+// From there on a study that nobody asked for by name is offered, not started [s].
+const LONG = 60;
+const isLong = (kind) => secondsOf(kind) > LONG;
 const pressed = () => STUDIES.filter((view) => view.pressed && !refusedFor(view.kind)).map(({ kind }) => kind);
-// How long all that one press begins takes, about.
-export const pressTakes = () => takes("sweep", "design", "pareto", ...pressed());
+// What one press begins behind what it is about, the cheapest first.
+const further = () => [...pressed(), "pareto"].filter((kind) => !isLong(kind)).sort((a, b) => secondsOf(a) - secondsOf(b));
+// How long all that takes, about.
+export const pressTakes = () => takes("sweep", "design", ...further());
 const forms = new Map();
 let studies = 0;
 // The amplitude [m] at which the band of the best design was measured.
@@ -75,11 +80,10 @@ function bodyOf(kind) {
   return wrong.length ? null : { ...askedFor(kind), ...ofTheBar(kind), ...body };
 }
 
-const begin = (kind, body = bodyOf(kind)) =>
-  (body ? run(kind, body, complaining(viewOf(kind), forms.get(kind)), viewOf(kind).priority) : Promise.resolve(false));
+const begin = (kind, body = bodyOf(kind), priority = viewOf(kind).priority) =>
+  (body ? run(kind, body, complaining(viewOf(kind), forms.get(kind)), priority) : Promise.resolve(false));
 
-const withTags = (body, tags) => body && { ...body, tags };
-
+const withMore = (body, more) => body && { ...body, ...more };
 const ask = (kind, body) => readSettings() && begin(kind, { ...askedFor(kind), ...ofTheBar(kind), ...several(kind), ...body });
 
 // The one button: every study of the scene.
@@ -90,14 +94,15 @@ function study() {
   const mine = (studies += 1);
   // What one press began is folded together among the runs.
   const tags = [`${PRESS}${Date.now().toString(36)}`];
-  const tagged = (kind) => begin(kind, withTags(bodyOf(kind), tags));
+  const rest = further();
+  const tagged = (kind, more = {}) => begin(kind, withMore(bodyOf(kind), { ...more, tags }), rest.includes(kind) ? -rest.indexOf(kind) : viewOf(kind).priority);
   const designed = tagged("design");
   const all = [
-    tagged("sweep").then(async (done) => done && (await referee(5, tags))),
+    tagged("sweep").then(async (done) => done && (isLong("march") || await referee(-rest.length, tags))),
     designed,
-    ...pressed().map(tagged),
-    frontAfter(designed, mine, tags),
+    ...rest.map((kind) => (kind === "pareto" ? frontAfter(designed, mine, tagged) : tagged(kind))),
   ];
+  for (const kind of [...pressed(), "pareto"].filter(isLong)) viewOf(kind).say(`Not begun with the others: it takes ${takes(kind)}.`);
   say("study-status", `${all.length} jobs are under way.`);
   Promise.all(all).then((done) => {
     const short = done.filter((each) => !each).length;
@@ -109,11 +114,10 @@ function study() {
 
 // The front after the best design, which tells a fixed amplitude for the band: at half power of each peak, the
 // highest peaks would have the narrowest bands, and the front would praise designs that damp nothing.
-async function frontAfter(designed, mine, tags) {
+async function frontAfter(designed, mine, tagged) {
   viewOf("pareto").say("The front waits for the best design: its band is measured at half power of that peak.");
   await designed;
-  const body = mine === studies && withTags(bodyOf("pareto"), tags);
-  return body && begin("pareto", bandAt === null ? body : { ...body, limit: bandAt });
+  return mine === studies && tagged("pareto", bandAt === null ? {} : { limit: bandAt });
 }
 
 // One study again, with what is set now; those with a form elsewhere are asked as it stands.
@@ -132,7 +136,6 @@ const computedFor = (kind) => computed.get(kind) ?? null;
 
 // What changed since, in words; empty if what is seen is of the present values, or if nothing is seen.
 export const changedSince = (kind) => (computed.has(kind) ? differences(kind, computed.get(kind)) : []);
-
 export const isUnderway = (kind) => underway.has(kind);
 
 export function startRenewal() {

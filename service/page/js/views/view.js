@@ -11,7 +11,7 @@ import { on } from "../base/state.js";
 //  about: what it says before anything is computed; work: what waits for a worker; goes(job): how far it is;
 //  figure(host): its chart; parts(): what the card has in its order; begin(): before anything is asked; start(): once,
 //  when the cards are there; scene(): at each scene;
-//  result, points, submitted: what jobs tell; drawings(result): of a kind without a card, those of “Other studies”}
+//  result, points, submitted: what jobs tell; drawings(result): of a kind without a card, in that of its question}
 export function view({ id, title, work, goes, about = "", ...own }) {
   const self = {
     id, title, about, goes,

@@ -108,7 +108,6 @@ function differences(found, summaries) {
 }
 
 const isEqual = ({ a, b }) => JSON.stringify(a ?? null) === JSON.stringify(b ?? null);
-
 const isNumber = (value) => typeof value === "number";
 
 function row({ name, unit, a, b }) {

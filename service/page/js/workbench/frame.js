@@ -6,6 +6,7 @@ import { button, byId, el, onSubmit, say, show } from "../base/dom.js";
 import { quantity } from "../base/format.js";
 import { FIRST_TAB, on, state, step, tell, write } from "../base/state.js";
 import { setKey } from "../network/api.js";
+import { refusedFor } from "../scene/kinds.js";
 import { ownValue, variable } from "../scene/scenes.js";
 import { TABS, viewOf } from "../views.js";
 import { putAll } from "../views/live.js";
@@ -96,7 +97,6 @@ function apply(theme) {
 }
 
 const MOVES = { ArrowRight: 1, ArrowLeft: -1 };
-
 const isOn = (card, name) => name === "all" || card.dataset.tabs.split(" ").includes(name);
 const cards = () => [...byId("panel").querySelectorAll("[data-tabs]")];
 // Of a tab whose cards are of a folder that was taken out there is none.
@@ -105,10 +105,28 @@ const tabs = () => TABS.filter(([name]) => cards().some((card) => isOn(card, nam
 // The tab that shows what a kind of job found.
 export const tabOf = (kind) => viewOf(kind)?.tabs?.split(" ")[0] ?? "runs";
 
+// Tabs of studies stand there once those were asked, or where the scene has them; that of all cards by its address.
+const QUIET = ["disk", "map", "accuracy", "all"];
+const wanted = new Set();
+
+function showTabs() {
+  for (const tab of byId("tabs").children) {
+    const name = tab.id.replace("tab-", "");
+    tab.hidden = QUIET.includes(name) && name !== state.tab && !wanted.has(name);
+  }
+}
+
 export function startTabs() {
-  const names = tabs().map(([name]) => name);
+  const want = (kind) => {
+    wanted.add(tabOf(kind));
+    showTabs();
+  };
+  on("job-begun", want);
+  on("scene-left", () => wanted.clear());
+  on("scene", () => (refusedFor("interference") ? showTabs() : want("interference")));
   show(byId("tabs"), tabs().map(([name, words]) => button(words, () => openTab(name), { role: "tab", id: `tab-${name}`, "aria-controls": "panel" })));
   byId("tabs").addEventListener("keydown", (event) => {
+    const names = [...byId("tabs").children].filter((tab) => !tab.hidden).map(({ id }) => id.replace("tab-", ""));
     const { length } = names;
     const next = event.key === "Home" ? 0 : event.key === "End" ? length - 1 : event.key in MOVES ? (names.indexOf(state.tab) + MOVES[event.key] + length) % length : -1;
     if (next < 0) return;
@@ -134,6 +152,7 @@ function openTab(name) {
     tab.setAttribute("aria-selected", String(chosen));
     tab.tabIndex = chosen ? 0 : -1;
   }
+  showTabs();
   byId("panel").setAttribute("aria-labelledby", `tab-${name}`);
   byId("panel").dataset.view = name;
   for (const card of cards()) card.classList.toggle("off", !isOn(card, name));

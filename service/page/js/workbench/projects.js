@@ -19,7 +19,6 @@ export function startProjects() {
 }
 
 const opened = () => projects.find(({ id }) => id === state.project) ?? null;
-
 export const projectsKnown = () => projects;
 
 // Every project of the owner; one that a link names and that is not there is left.

@@ -14,7 +14,6 @@ let next = null;
 let asked = 0;
 let wanted = [];
 let asking = 0;
-
 export const isUnderWay = ({ status }) => status === "accepted" || status === "running";
 
 // All that are known, newest first; ids grow with time.
@@ -25,11 +24,8 @@ export const lastTold = (id) => known.get(id) ?? null;
 
 // What was asked of a run and what came out; null until the service has said it.
 export const summaryOf = ({ id }) => summaries.get(id) ?? null;
-
 export const hasMore = () => next !== null;
-
 export const titleOf = (run) => run.name || `${run.kind} of ${run.scene ?? "a scene"}`;
-
 export const pressOf = ({ tags }) => tags.find((tag) => tag.startsWith(PRESS)) ?? "";
 
 export function startRunList() {
