@@ -214,3 +214,17 @@ def test_the_theme_can_be_chosen_and_stays(profile: Profile, site: Site) -> None
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") != light
     page.reload()
     expect(page.locator("html")).to_have_attribute("data-theme", "dark")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_questions_are_for_everybody_too(browser: Browser, site: Site, scheme: str) -> None:
+    with opened(browser, site, color_scheme=scheme) as (context, _):
+        page = visit(context, site, "?scene=two-dof&tab=studies&harmonics=3")
+        assert serious(page) == []
+        page.locator("#ask-margin-submit").focus()
+        page.keyboard.press("Enter")
+        expect(page.locator("#ask-margin-result svg.chart").first).to_be_visible()
+        assert serious(page) == []
+        for width, height in ((640, 450), (390, 844)):
+            page.set_viewport_size({"width": width, "height": height})
+            assert page.evaluate("document.documentElement.scrollWidth - innerWidth") <= 0

@@ -244,3 +244,14 @@ def test_a_slow_response_is_drawn_coarser_first_and_says_so(profile: Profile, si
         route.continue_()
     expect(status).not_to_contain_text("preview with")
     expect(status).to_contain_text("answered after")
+
+
+def test_a_best_value_on_its_bound_is_searched_wider_at_one_press(profile: Profile, site: Site) -> None:
+    page = visit(profile[0], site, "?scene=two-dof&tab=design&harmonics=3&range=10:80")
+    page.click("#study")
+    expect(page.locator("#answer-stale")).to_contain_text("Best at the upper bound, 80 N", timeout=LONG_MS)
+    page.click("#widen")
+    expect(page.locator("#high")).to_have_value("800")
+    expect(page.locator("#answer-body")).to_contain_text("104.", timeout=LONG_MS)
+    expect(page.locator("#widen")).to_have_count(0)
+    assert "range=10:800" in page.url

@@ -44,10 +44,10 @@ export function measured(value, unit, error = null, digits = 4) {
   return `${number(value * per, digits)} ± ${number(error * per, 2)} ${name}`.trim();
 }
 
+// What is known of the error of a peak: as it is judged, where max |x| has none.
+export const errorOf = ({ error_estimate: error, relative_error: share, peak }) => (typeof error === "number" ? error : typeof share === "number" && peak ? share * peak.value : null);
 export const length = (metres) => measured(metres, "m");
-
 export const hertz = (value) => measured(value, "Hz");
-
 export const unitOf = (path) => UNITS.get(path) ?? (path.startsWith("structure.") ? "" : UNITS.get(path.split(".").pop()) ?? "");
 export const withUnit = (path) => (unitOf(path) ? `${path} [${unitOf(path)}]` : path);
 export const quantity = (path, value) => measured(value, unitOf(path));

@@ -147,14 +147,7 @@ function curve(line, base) {
   if (line.bars) return bars(line, base);
   const nodes = [];
   if (line.width !== 0) {
-    nodes.push(
-      svg("path", {
-        class: `series ${line.paint ?? `c${line.colour ?? 1}`}`,
-        d: pathOf(xs, ys, line.x, line.y),
-        "stroke-dasharray": DASHES[line.dash],
-        "stroke-width": line.width ?? 2,
-      }),
-    );
+    nodes.push(svg("path", { class: `series ${line.paint ?? `c${line.colour ?? 1}`}`, d: pathOf(xs, ys, line.x, line.y), "stroke-dasharray": DASHES[line.dash], "stroke-width": line.width ?? 2 }));
   }
   if (line.shape) {
     line.x.forEach((value, i) => {

@@ -21,11 +21,7 @@ export function throughPeak({ parameter, amplitude, peak, unstable }) {
   }
   if (after < 0) return same;
   const moved = (i) => (i >= after ? i + 1 : i);
-  return {
-    parameter: parameter.toSpliced(after, 0, peak.at),
-    amplitude: amplitude.toSpliced(after, 0, peak.value),
-    unstable: unstable?.map(([first, last]) => [moved(first), moved(last)]),
-  };
+  return { parameter: parameter.toSpliced(after, 0, peak.at), amplitude: amplitude.toSpliced(after, 0, peak.value), unstable: unstable?.map(([first, last]) => [moved(first), moved(last)]) };
 }
 
 // A response as a chart: curve, peak, band. `more` are further curves.

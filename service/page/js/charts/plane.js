@@ -89,14 +89,7 @@ const LEAST = 1e-300; // what a logarithmic axis draws nothing and less at
 
 function scale(log, low, high, from, to) {
   const of = (log ? scaleLog() : scaleLinear()).domain([low, high > low ? high : low + 1]).range([from, to]);
-  return {
-    low,
-    high,
-    log: Boolean(log),
-    at: log ? (value) => of(Math.max(value, LEAST)) : of,
-    back: of.invert,
-    ticks: (count) => (log ? logTicks(of, count) : of.ticks(count).map(tick)),
-  };
+  return { low, high, log: Boolean(log), at: log ? (value) => of(Math.max(value, LEAST)) : of, back: of.invert, ticks: (count) => (log ? logTicks(of, count) : of.ticks(count).map(tick)) };
 }
 
 // Lines at the digits of each decade, with numbers at those there is room for; less than a decade has round numbers.

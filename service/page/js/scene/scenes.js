@@ -10,13 +10,8 @@ const FORCE = "excitation";
 export const listScenes = () => everyItem("/v1/scenes");
 
 export async function loadScene(name) {
-  const [{ scene }, { items, joints, studies }] = await Promise.all([
-    request(`/v1/scenes/${encodeURIComponent(name)}`),
-    request("/v1/scenes/parameters", { method: "POST", body: { scene: name } }),
-  ]);
-  Object.assign(current, {
-    body: scene, joints, parameters: new Map(items.map((parameter) => [parameter.path, parameter])), studies: new Map(studies.map((study) => [study.kind, study])),
-  });
+  const [{ scene }, { items, joints, studies }] = await Promise.all([request(`/v1/scenes/${encodeURIComponent(name)}`), request("/v1/scenes/parameters", { method: "POST", body: { scene: name } })]);
+  Object.assign(current, { body: scene, joints, parameters: new Map(items.map((parameter) => [parameter.path, parameter])), studies: new Map(studies.map((study) => [study.kind, study])) });
   learnUnits(items.flatMap(({ path, name: own, unit }) => [[path, unit], [own, unit]]));
   return current.body;
 }

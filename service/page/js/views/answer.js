@@ -1,12 +1,13 @@
 // The answer in large figures: what to build, the peak and the band before and after, how far to trust it.
 
-import { on, state } from "../base/state.js";
-import { byId, el, note, show } from "../base/dom.js";
+import { on, state, tell } from "../base/state.js";
+import { button, byId, el, note, show } from "../base/dom.js";
 import { saveFrom } from "../base/exports.js";
-import { hertz, length, number, quantity, shownUnit } from "../base/format.js";
+import { errorOf, hertz, length, number, quantity, shownUnit } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 import { inUse, sameValues } from "../scene/inputs.js";
-import { givenByScene, variable } from "../scene/scenes.js";
+import { current, givenByScene, variable } from "../scene/scenes.js";
+import { fillSettings } from "../scene/settings.js";
 import { load } from "./design.js";
 import { changedSince, isUnderway, pressTakes, staleWords } from "./study.js";
 
@@ -62,7 +63,7 @@ function draw() {
 
 function actions() {
   const { request, result } = designed;
-  show(byId("answer-stale"), staleWords("design", changedSince("design"), "Find it again"));
+  show(byId("answer-stale"), staleWords("design", changedSince("design"), "Find it again"), widened());
   const used = inUse(request, result.optimum);
   const use = byId("use-design");
   use.textContent = used ? "In use" : "Use";
@@ -70,6 +71,24 @@ function actions() {
   use.onclick = () => load(result.optimum, request);
   byId("save-report").onclick = () => saveReport("save-report", "html", "text/html");
   byId("save-pdf").onclick = () => saveReport("save-pdf", "pdf", "application/pdf");
+}
+
+// A best value on its bound: what lies beyond is one press away, as far as the slider goes where that has no ratios.
+function widened() {
+  const { request: { variables = {} }, result: { conditions } } = designed;
+  const [{ variable: path, side } = {}] = conditions?.bounds ?? [];
+  const { slider } = current.parameters.get(path) ?? {};
+  if (!slider || path !== variable() || !variables[path] || changedSince("design").length) return null;
+  const [low, high] = variables[path];
+  const range = (side === "upper" ? [low, slider.logarithmic ? 10 * high : slider.high] : [slider.logarithmic ? low / 10 : slider.low, high]).map((end) => Number(end.toPrecision(4)));
+  const search = () => {
+    state.range = range;
+    fillSettings();
+    tell("settings");
+    tell("renew", "design");
+  };
+  const beyond = range[0] > 0 && (range[0] < low || range[1] > high);
+  return [`Best at the ${side} bound, ${quantity(path, side === "upper" ? high : low)}. `, beyond ? button(`Widen to ${range.map((end) => quantity(path, end)).join(" – ")}, search again`, search, { id: "widen" }) : null];
 }
 
 // The service makes it, from the job of the design: of the problem that was solved, whatever is set now.
@@ -103,7 +122,8 @@ function bandFigure({ band_hz: band, limit }, was) {
   return ["Resonance band", value, band === null ? "" : `above ${length(limit)}`, "answer-band"];
 }
 
-function errorFigure({ error_estimate: error, peak }) {
+function errorFigure({ peak, ...told }) {
+  const error = errorOf({ peak, ...told });
   if (typeof error !== "number") return ["Error estimate", "–", "not known", "answer-error"];
   return ["Error estimate", length(error), peak ? `${number((100 * error) / peak.value, 2)} % of the peak` : "", "answer-error"];
 }

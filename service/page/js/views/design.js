@@ -2,7 +2,7 @@
 
 import { on, state, tell } from "../base/state.js";
 import { bad, button, byId, el, details, facts, note, numeric, scrolledTable, show, titled } from "../base/dom.js";
-import { hertz, length, measured, notes, number, quantity, seconds, valuesSaid } from "../base/format.js";
+import { errorOf, hertz, length, measured, notes, number, quantity, seconds, valuesSaid } from "../base/format.js";
 import { Problem, patiently, post } from "../network/api.js";
 import { previewer } from "../network/previews.js";
 import { asked } from "../scene/scenes.js";
@@ -43,7 +43,7 @@ export const design = view({
     design.facts(
       facts([
         ...found,
-        ["highest peak", result.peak ? `${measured(result.peak.value, "m", result.error_estimate)} at ${hertz(result.peak.at)}` : "–"],
+        ["highest peak", result.peak ? `${measured(result.peak.value, "m", errorOf(result))} at ${hertz(result.peak.at)}` : "–"],
         ...Object.entries(result.plateau ?? {}).map(([path, [low, high]]) => [`${path}, as good`, `${quantity(path, low)} to ${quantity(path, high)}`]),
         ...(result.chosen_by ? [["chosen by", result.chosen_by]] : []),
         ...(result.warnings ?? []).map((words) => ["warning", bad(words)]),

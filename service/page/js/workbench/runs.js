@@ -10,6 +10,8 @@ const MOST = 8;
 const MOST_VALUES = 3;
 const LEADING = ["design", "identify", "pareto", "modes", "sweep"];
 export const WORDS = { accepted: "waits", running: "runs", failed: "failed", dismissed: "stopped" };
+// A run that ended short of its goal has a result: it did not fail.
+export const wordOf = (run) => (run.status === "failed" && peakOf(run) ? "fell short" : WORDS[run.status]);
 
 export function startRuns() {
   on("runs", draw);
@@ -75,7 +77,7 @@ function progressed(run) {
 function line(run) {
   const title = titleOf(run);
   const open = state.jobs[run.kind] === run.id;
-  const words = [peakOf(run), ...valuesOf(run, 1), WORDS[run.status] ?? ""].filter(Boolean).join(" · ");
+  const words = [peakOf(run), ...valuesOf(run, 1), wordOf(run) ?? ""].filter(Boolean).join(" · ");
   return el("li", { class: open ? "run is-shown" : "run", "data-run": run.id },
     button([el("span", {}, el("b", {}, title), isUnderWay(run) ? "" : el("span", { class: "run-what" }, words)), sparkline(summaryOf(run)?.curve)], () => openRun(run),
       { class: "run-name", "data-focus": `open-${run.id}`, "aria-current": open ? "true" : undefined, title: when(run.created) }),

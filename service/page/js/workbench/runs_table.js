@@ -8,7 +8,7 @@ import { METRES, number, when } from "../base/format.js";
 import { compareRuns } from "./comparison.js";
 import { isHidden, runForm } from "./run_form.js";
 import { hasMore, isUnderWay, listRuns, PINNED, runs, summaryOf, titleOf } from "./run_list.js";
-import { isPinned, openRun, peakOf, presses, sparkline, underWay, valuesOf, WORDS } from "./runs.js";
+import { isPinned, openRun, peakOf, presses, sparkline, underWay, valuesOf, wordOf, WORDS } from "./runs.js";
 
 // What a row is sorted by; empty figures come last whichever way.
 const COLUMNS = [
@@ -121,7 +121,7 @@ function row({ run, more, inside }) {
   const named = [
     more ? unfold(unfolded.has(run.id) ? "▾" : "▸", unfolded, "fold", `${more} more runs of the press of ${title}`, "fold") : null,
     button(run.name || run.kind, () => openRun(run), { class: "run-name", "data-focus": `open-${run.id}`, "aria-current": shown ? "true" : undefined }), more ? el("span", { class: "note" }, ` and ${more} more`) : null,
-    run.status === "failed" || run.status === "dismissed" ? el("span", { class: "chip bad", title: run.error?.detail }, WORDS[run.status]) : null,
+    run.status === "failed" || run.status === "dismissed" ? el("span", { class: "chip bad", title: run.error?.detail }, wordOf(run)) : null,
     el("ul", { class: "tags", "aria-label": "Tags" }, run.tags.filter((tag) => !isHidden(tag)).map((tag) => el("li", {}, tag)))];
   const cells = [run.scene ?? "", run.error?.detail && run.status === "failed" ? bad(run.error.detail) : valuesOf(run).join(", "), peakOf(run), summary?.band_hz ? number(summary.band_hz) : "", summary?.harmonics ?? "",
     isUnderWay(run) ? underWay(run, title) : sparkline(summary?.curve), when(run.created)];
