@@ -136,7 +136,7 @@ def plain(data: object, depth: int = 0) -> object:
         return data.model_dump(exclude_none=True)
     if depth < _DEEPEST and isinstance(data, Mapping):
         return {key: plain(value, depth + 1) for key, value in data.items()}
-    if depth < _DEEPEST and isinstance(data, list | tuple):
+    if depth < _DEEPEST and type(data) in (list, tuple):
         return [plain(value, depth + 1) for value in data]
     return data
 

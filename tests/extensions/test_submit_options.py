@@ -147,7 +147,7 @@ def test_a_problem_of_another_kind_has_the_options_of_problems(told: list[Mappin
 
 def test_options_of_the_local_command_keep_their_words() -> None:
     """Every option of `stickslip KIND` that stands for a key is one of `stickslip submit KIND`."""
-    own = {"plot", "out", "as_json", "accuracy", "effects", "report", "uncertain", "column"}
+    own = {"plot", "out", "as_json", "accuracy", "effects", "report", "uncertain", "column", "without"}
     for one in SHIPPED:
         local = submit.TOP[one.name].function()
         known = {flag: param for flag, param in submit.options_of(local).items() if param.name not in own}

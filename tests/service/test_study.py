@@ -19,7 +19,7 @@ from service.jobs.study import Study
 from solver.first_use import on_demand
 
 STUDIES = studies()
-OF_THE_COMMAND = {"--set", "--plot", "--out", "--json", "--report", "--uncertain", "--problem"}
+OF_THE_COMMAND = {"--set", "--plot", "--out", "--json", "--report", "--uncertain", "--problem", "--without"}
 # Functions besides that take keys of a study.
 BESIDES = {
     "solve": ("solver:solve_all",), "design": ("optim:robust_design",), "sensitivities": (),

@@ -258,7 +258,8 @@ def test_files_that_cannot_be_read(tmp_path: Path):
     assert "one table, got list" in message(file("c.json", b"[]"))
     assert "nested too deeply" in message(file("d.json", b"[" * 200_000))
     assert "not UTF-8" in message(file("b.toml", b"name = '\xff'"))
-    assert "must end in .toml or .json, got '.txt'" in message(file("a.txt", b""))
+    assert "measurements are for `stickslip identify" in message(file("a.txt", b""))
+    assert "must end in .toml or .json, got '.yaml'" in message(file("a.yaml", b""))
 
 
 def test_ends():

@@ -195,7 +195,7 @@ def test_rows_of_elements_alone_are_named_and_weigh_nothing(
     said = " ".join(capsys.readouterr().out.split())
     assert "252 rows (144 of them elements' own, such as incompatible modes)" in said
     # In the first of four bricks along x the motion rises from 0 at the foot: a third of its mass moves.
-    assert float(said.split("mass ")[1].split(" kg")[0]) == pytest.approx(
-        7850.0 * 0.08 * 0.02 * 0.004 * (3.0 + 1.0 / 3.0) / 4.0, rel=1e-3
+    assert float(said.split("mass ")[1].split(" g")[0]) == pytest.approx(
+        1e3 * 7850.0 * 0.08 * 0.02 * 0.004 * (3.0 + 1.0 / 3.0) / 4.0, rel=1e-3
     )
     assert solver.load_scene("block.toml").structure.modes is not None

@@ -44,7 +44,7 @@ def test_the_demonstration_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixt
         loads = {sweep.contacts["damper"].N0 for sweep in stored}
         assert {REMOVED, STUCK, *SMALL.shown, *SMALL.loads} <= loads
         best = min(stored, key=lambda sweep: sweep.peak.value if sweep.peak else float("inf"))
-        assert pytest.approx(load, rel=1e-5) == best.contacts["damper"].N0
+        assert pytest.approx(load, rel=5e-4) == best.contacts["damper"].N0
         again = solver.sweep(solver.load_scene("two-dof").with_values({"damper.N0": 90.0}))
         ninety = next(sweep for sweep in stored if sweep.contacts["damper"].N0 == 90.0)
         assert service.sweep(ninety.id).arrays["amplitude"] == pytest.approx(again.amplitude)
