@@ -19,6 +19,7 @@ from solver.contacts.fields import GROUND, End, parse_end
 from solver.contacts.laws.law_registry import DEFAULT, laws
 from solver.contacts.laws.load_harmonics import LoadHarmonic
 from solver.errors import Issue, Place, Shown, pointer
+from solver.matrices.values import Named
 from solver.results.told import UNIT
 from solver.results.units import bound_said, doubt_said, has_suffix, read
 from solver.scene.bodies.body import Body, Load, Node, body_dofs
@@ -136,7 +137,7 @@ def plain(data: object, depth: int = 0) -> object:
         return data.model_dump(exclude_none=True)
     if depth < _DEEPEST and isinstance(data, Mapping):
         return {key: plain(value, depth + 1) for key, value in data.items()}
-    if depth < _DEEPEST and type(data) in (list, tuple):
+    if depth < _DEEPEST and isinstance(data, list | tuple) and not isinstance(data, Named):
         return [plain(value, depth + 1) for value in data]
     return data
 
