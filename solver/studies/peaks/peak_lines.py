@@ -335,8 +335,8 @@ class HeldAmplitude(FollowedPeak):
         length, u = z - here[Z], solutions[last] + (z - here[Z]) * tangents[last]
         omega = float(here[OMEGA] + length * here[DOMEGA])
         if self._smooth and last and abs(length) < 3.0 * abs(here[Z] - rows[last - 1, Z]):
-            ends = rows[last - 1], here, solutions[last - 1], solutions[last], tangents[last - 1], tangents[last]
-            omega = between_rows(*ends, z, u)
+            ends = [part[each] for part in self.found for each in (last - 1, last)]
+            omega = between_rows(ends[0], ends[1], ends[2], ends[3], ends[4], ends[5], z, u)
         steps = self._solved(z, u, omega, float(here[PLACE]))
         if steps is None:
             return math.inf, _MOST_TURNS, False
