@@ -142,9 +142,7 @@ def plain(data: object, depth: int = 0) -> object:
     return data
 
 
-_NUMERIC = re.compile(
-    r"\b(?:Positive|NonNegative|Signed|Friction|Angle|Inclination|Stiffness|float|Vector)\b"
-)
+_NUMERIC = re.compile(r"\b(Positive|NonNegative|Signed|Friction|Angle|Inclination|Stiffness|float|Vector)\b")
 
 
 def unit_of(place: Place, raw: Mapping[str, Any]) -> str | None:
@@ -163,17 +161,13 @@ def _units_of_keys() -> dict[str, str]:
     found = {"load": "N", "speed": "1/min", "speed_order": "", "k": "N/m", "c": "N s/m", "m": "kg"}
     models = (model for _, model in (*_TABLES.values(), *_tables_of_kinds().values()))
     for key, (kind, words) in chain.from_iterable(every_field_said(model).items() for model in models):
-        units = [unit for unit in UNIT.findall(words) if "," not in unit]
         if _NUMERIC.search(kind) and not found.get(key):
-            found[key] = units[0] if units else ""
+            found[key] = next((unit for unit in UNIT.findall(words) if "," not in unit), "")
     return found
 
 
 def in_si(raw: Any, whole: Mapping[str, Any], place: Place = ()) -> Any:
-    """A scene whose numbers may have a unit behind them, ``"35 deg"``, with those numbers as they are meant.
-
-    What cannot be read stays as it is.
-    """
+    """A scene with numbers where they have a unit behind them, ``"35 deg"``; what cannot be read stays."""
     if isinstance(raw, str):
         unit = unit_of(place, whole) if has_suffix(raw) else None
         with suppress(ValueError):

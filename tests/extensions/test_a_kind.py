@@ -245,7 +245,7 @@ def test_the_command_prints_what_it_does_not_know(
     monkeypatch.setenv("STICKSLIP_URL", url)
     assert main(["results", job.id]) == 0
     shown = capsys.readouterr().out
-    assert re.search(rf"worst\s+{max(wanted(0.9, 1.2)):.6g}", shown)
+    assert re.search(rf"worst\s+{max(wanted(0.9, 1.2)):.4g}", shown)
 
 
 def test_the_description_of_the_api_has_body_and_result(url: str) -> None:

@@ -49,7 +49,7 @@ def test_several_bands_levels_and_orders_are_judged_together() -> None:
     assert held is not None
     assert f"{held.what} of {held.case}" in result.active
     assert str(result.peak).endswith("Hz>")
-    assert f"value {result.peak.value:.6g} m" in str(result.peak)  # type: ignore[union-attr]
+    assert f"value {1e3 * result.peak.value:.4g} mm" in str(result.peak)  # type: ignore[union-attr]
     frame = result.to_pandas()
     at = frame[frame["optimum"]].iloc[0]
     assert at["peak_of_order 2"] == pytest.approx(second, rel=1e-9)

@@ -68,7 +68,7 @@ def test_a_newcomer_presses_one_button_and_takes_results_away(profile: Profile, 
     expect(page.locator("#study-status")).to_have_text("Everything is there.", timeout=LONG_MS)
     for status in ("response", "design", "map", "front", "accuracy", "campbell"):
         expect(page.locator(f"#{status}-status")).not_to_have_class("bad")
-    expect(page.locator("#response-facts")).to_contain_text("highest peak2.35 m at 1.0372")
+    expect(page.locator("#response-facts")).to_contain_text("highest peak2.35 m ± 73 µm at 1.037")
     expect(page.locator("#response-facts")).to_contain_text("resonance band")
     expect(page.locator("#design-facts")).to_contain_text("104.8 N")
     expect(page.locator("#plan-facts")).to_contain_text("left out")

@@ -181,7 +181,7 @@ class Tracker(Looking):
         Whether there is a new line that reaches into it.
         """
         before, enough = len(self.lines), self.enough
-        if math.isinf(enough):
+        if not 0.0 < enough < math.inf:
             return False
         seen = sorted((look for look in self.looks if look.seen), key=lambda look: look.z)
         below = [(look, self.scale.high) for look in seen if look.z <= 0.5 * (low + high)][-1:]
