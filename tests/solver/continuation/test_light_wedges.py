@@ -74,7 +74,8 @@ def test_a_first_point_is_found_from_few_harmonics_upward(mass: float) -> None:
     """Neither from stuck contacts nor by half as many harmonics again: by one or two more at a time."""
     solution = solver.solve(shipped("wedge", mass), frequency_hz=300.0, harmonics=11)
     assert solution.converged
-    assert solution.newton_iterations < 700
+    # By the other ways thousands; rounding decides by some tens.
+    assert solution.newton_iterations < 1000
     marched = solver.march(
         shipped("wedge", mass), frequency_hz=300.0, start=start_of(solution), max_periods=3
     )
