@@ -469,9 +469,9 @@ def _bounded(tracker: Tracker, share: float) -> bool:
 
     What stands beside it, in a gap, then only has to be higher than that.
     """
-    least = min((look.top for look in tracker.looks if look.seen), default=math.inf)
     found = minima(tracker, 0.0, 1)[0]
-    if not found.bracketed or not found.height < least * (1.0 - LOWER) or seen(tracker, found.z) is not None:
+    lower = found.bracketed and found.height < tracker.least * (1.0 - LOWER)
+    if not lower or seen(tracker, found.z) is not None:
         return False
     tracker.follow(tracker.look(found.z), share, found.rows, careful=True)
     return True

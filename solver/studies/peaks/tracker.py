@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -72,6 +72,7 @@ ENDING = 0.1  # of the first step: as short as steps become before a line ends
 EXACTLY = 1e-6  # relative distance within which a peak is one that was solved at the same place
 # What an amplitude that is held lies above what is enough by: share of what the peak does, and at most.
 ABOVE, MOST_ABOVE, LEAST_ABOVE = 0.25, 0.02, 1e-4
+_Track = tuple[LineEnd, Real, Real, Real, float]  # why it ended, rows, solutions, tangents and its sign
 
 
 def check_laws(scene: Scene) -> None:
@@ -104,10 +105,14 @@ class Tracker(Looking):
         self._held: set[tuple[float, float, float]] = set()  # z, end of the range and amplitude asked for
 
     @property
+    def least(self) -> float:
+        """The least of the highest peaks of all sweeps [m]."""
+        return min((look.top for look in self.looks if look.seen), default=math.inf)
+
+    @property
     def enough(self) -> float:
         """The height from which a line only has to show that it is higher [m]."""
-        least = min((look.top for look in self.looks if look.seen), default=math.inf)
-        return least * self._pace.above
+        return self.least * self._pace.above
 
     def follow_up_to(self, above: float) -> None:
         """Set `Pace.above` for the lines to come, and for what counts as a minimum of those there are."""
@@ -207,18 +212,11 @@ class Tracker(Looking):
         guess = (1.0 - share) * solutions[at] + share * solutions[inner]
         u, omega = fitted(guess[:-1].copy(), look.branch.balance.system.ks, self.balance), float(guess[-1])
         seed = Seed(z=look.z, omega=omega, u=u, sign=0.0, place=0.0, fixed=False, height=height)
-        ridge = self._ridge(look.z, end, fixed=False)
-        why, rows, solutions, tangents, sign = self._walked(
-            HeldAmplitude(self._system, self._summit, ridge, seed, 0.25 * more)
-        )
-        if len(rows) > 1:
-            way, ends = (1, (LineEnd.NOT_FOUND, why)) if end > look.z else (-1, (why, LineEnd.NOT_FOUND))
-            self.lines.append(
-                Line(
-                    rows=rows[::way], solutions=solutions[::way], tangents=tangents[::way], sign=sign,
-                    fixed=False, ends=ends, held=True,
-                )
-            )  # fmt: skip
+        far = self._track(seed, end, partial(HeldAmplitude, within=0.25 * more))
+        if len(far[1]) > 1:
+            near = LineEnd.NOT_FOUND, far[1][:1], far[2][:1], far[3][:1], far[4]
+            ways = (near, far) if end > look.z else (far, near)
+            self.lines.append(_joined(*ways, fixed=False, held=True))
 
     def _seed_of(self, z: float, rival: Rival, ks: Integer) -> Seed:
         """Return the seed of a peak that is known as near as the points of a walk are."""
@@ -328,11 +326,7 @@ class Tracker(Looking):
         down = self._track(seed, low)
         if len(up[1]) == 0 or len(down[1]) == 0:
             return None
-        return Line(
-            rows=np.concatenate([down[1][:0:-1], up[1]]), solutions=np.concatenate([down[2][:0:-1], up[2]]),
-            tangents=np.concatenate([down[3][:0:-1], up[3]]), sign=up[4], fixed=seed.fixed,
-            ends=(down[0], up[0]),
-        )  # fmt: skip
+        return _joined(down, up, fixed=seed.fixed)
 
     def _followed(self, seed: Seed) -> bool:
         """Return whether what follows from a line was followed already; it is then."""
@@ -386,20 +380,26 @@ class Tracker(Looking):
             slack=pace.slack, climb_from=pace.climb_from * self.scale.span,
         )  # fmt: skip
 
-    def _track(self, seed: Seed, stop: float) -> tuple[LineEnd, Real, Real, Real, float]:
-        """Follow a peak one way; return why it ended, its rows, solutions, tangents and its sign."""
+    def _track(self, seed: Seed, stop: float, what: Callable[..., FollowedPeak] = FollowedPeak) -> _Track:
+        """Follow a peak, or an amplitude on its flank, one way."""
         self.check()
-        ridge = self._ridge(seed.z, stop, fixed=seed.fixed)
-        return self._walked(FollowedPeak(self._system, self._summit, ridge, seed))
-
-    def _walked(self, peak: FollowedPeak) -> tuple[LineEnd, Real, Real, Real, float]:
-        """Follow as far as it goes, and return the same."""
+        peak = what(self._system, self._summit, self._ridge(seed.z, stop, fixed=seed.fixed), seed)
         for count in walk(peak, self._steps):
             self.check()
             if count == MOST_ROWS:
                 break
         rows, solutions, tangents = (part[: peak.count].copy() for part in peak.found)
         return peak.end, rows, solutions, tangents, float(summit_numbers(self._summit)[SIGN])
+
+
+def _joined(down: _Track, up: _Track, *, fixed: bool, held: bool = False) -> Line:
+    """Return the line that goes both ways from the same row."""
+    ways = zip(down[1:4], up[1:4], strict=True)
+    rows, solutions, tangents = (np.concatenate([before[:0:-1], behind]) for before, behind in ways)
+    return Line(
+        rows=rows, solutions=solutions, tangents=tangents, sign=up[4], fixed=fixed, ends=(down[0], up[0]),
+        held=held,
+    )  # fmt: skip
 
 
 ALLOWED = 0.25  # share of what an interval is higher by that its cubic may be wrong by
