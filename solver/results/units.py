@@ -135,15 +135,16 @@ def number(value: float, digits: int = 4) -> str:
     return f"{float(mantissa):g}e{int(power)}"
 
 
-_SIGNS = {
+BOUNDS = {
     "greater_than": ("gt", ">"), "greater_than_equal": ("ge", ">="), "less_than_equal": ("le", "<="),
     "less_than": ("lt", "below"),
 }  # fmt: skip
+"""By pydantic's name of an error, the key of the bound and how it is said."""
 
 
 def bound_said(found: Mapping[str, Any], unit: str) -> str:
     """Say what pydantic wants of a number in a unit: ``must be below 1.5 rad (86°)``."""
-    key, sign = _SIGNS.get(found["type"], ("", ""))
+    key, sign = BOUNDS.get(found["type"], ("", ""))
     if not sign:
         return str(found["msg"]).replace("Input should", "must")
     limit = found["ctx"][key]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import cache
 from itertools import chain, islice
 from typing import Any, cast
 
@@ -19,9 +20,10 @@ from solver.contacts.fields import GROUND, End, parse_end
 from solver.contacts.laws.law_registry import DEFAULT, laws
 from solver.contacts.laws.load_harmonics import LoadHarmonic
 from solver.errors import Issue, Place, Shown, pointer
+from solver.extensions import on_change
 from solver.matrices.values import Named
 from solver.results.told import UNIT
-from solver.results.units import bound_said, doubt_said, has_suffix, read
+from solver.results.units import BOUNDS, bound_said, doubt_said, has_suffix, read
 from solver.scene.bodies.body import Body, Load, Node, body_dofs
 from solver.scene.bodies.body_shapes import SHAPES, WITH_BODY
 from solver.scene.cyclic.sector_tables import is_cyclic
@@ -112,22 +114,16 @@ def _tables_of_kinds() -> dict[tuple[str, ...], _Table]:
     return found
 
 
-_BOUNDS = ("greater_than", "greater_than_equal", "less_than_equal", "less_than")
 _WANTED = {
     "float_type": "must be a number",
-    "int_type": "must be a whole number",
-    "int_from_float": "must be a whole number",
+    **dict.fromkeys(("int_type", "int_from_float"), "must be a whole number"),
     "finite_number": "must be a finite number",
     "string_type": "must be a text",
     "string_pattern_mismatch": "may have only letters, digits, _ and -",
     "tuple_type": "must be a list",
-    "dict_type": "must be a table",
+    **dict.fromkeys(("dict_type", "model_type", "model_attributes_type"), "must be a table"),
     "too_short": "must not be empty",
-    "model_type": "must be a table",
-    "model_attributes_type": "must be a table",
 }
-
-
 _DEEPEST = 50  # a scene is five levels deep
 
 
@@ -156,14 +152,19 @@ def unit_of(place: Place, raw: Mapping[str, Any]) -> str | None:
     return _units_of_keys().get(keys[-1]) if keys else None
 
 
+@cache
 def _units_of_keys() -> dict[str, str]:
     """The unit of every key of a number, as its class says it; of one key it is the same everywhere."""
-    found = {"load": "N", "speed": "1/min", "speed_order": "", "k": "N/m", "c": "N s/m", "m": "kg"}
+    found = {"load": "N", "speed": "1/min", "speed_order": "", "m": "kg"}
+    found |= {key: one.unit for law in laws().values() for key, one in law.PARAMETERS.items()}
     models = (model for _, model in (*_TABLES.values(), *_tables_of_kinds().values()))
     for key, (kind, words) in chain.from_iterable(every_field_said(model).items() for model in models):
         if _NUMERIC.search(kind) and not found.get(key):
             found[key] = next((unit for unit in UNIT.findall(words) if "," not in unit), "")
     return found
+
+
+on_change(_units_of_keys.cache_clear)
 
 
 def in_si(raw: Any, whole: Mapping[str, Any], place: Place = ()) -> Any:
@@ -211,7 +212,7 @@ def _field_issue(found: ErrorDetails, raw: dict[str, Any]) -> Issue:
     if kind == "value_error":
         return Issue(tuple(steps), str(context["error"]), named=False)
     unit = unit_of(place, raw) or ""
-    if kind in _BOUNDS:
+    if kind in BOUNDS:
         wanted = bound_said(found, unit)
         if isinstance(last, dict) and name in _table(found["loc"])[1]:
             # Another key gave the number, as the list of a load gives N0.
@@ -265,8 +266,7 @@ def table_of(loc: tuple[int | str, ...]) -> _Table:
 
 def structure_of(raw: Mapping[str, Any]) -> dict[str, Any]:
     """The table of the structure; an empty one where it is none."""
-    structure = raw.get("structure")
-    return structure if isinstance(structure, dict) else {}
+    return found if isinstance(found := raw.get("structure"), dict) else {}
 
 
 def cross_issues(raw: dict[str, Any]) -> list[Issue]:

@@ -71,6 +71,20 @@ def test_the_balance_is_what_marching_its_sliders_gives(limit: float) -> None:
     assert found.half_peak_to_peak == pytest.approx(referee.half_peak_to_peak, rel=2e-4)
 
 
+def test_its_numbers_may_have_a_unit_behind_them() -> None:
+    """Also where units of keys were asked for before the law was there."""
+    plain = solver.load_scene("two-dof").to_dict()
+    plain["contacts"][0]["kt"] = "25 N/m"
+    assert solver.Scene.from_dict(plain).contacts[0].kt == 25.0
+    register(SlidersContact)
+    try:
+        (joint,) = SCENE["contacts"]
+        read = solver.Scene.from_dict({**SCENE, "contacts": [{**joint, "limit": "0.8e-3 kN"}]})
+        assert read.contacts[0].limit == pytest.approx(0.8)
+    finally:
+        unregister(SlidersContact)
+
+
 @pytest.mark.usefixtures("registered")
 def test_its_friction_work_is_the_area_of_its_loop() -> None:
     branch = solver.sweep(scene(), harmonics=HARMONICS)
@@ -131,7 +145,7 @@ def test_what_is_wrong_is_told() -> None:
     with pytest.raises(solver.SceneError) as refused:
         solver.Scene.from_dict(wrong)
     said = {issue.pointer: issue.said() for issue in refused.value.issues}
-    assert said["/contacts/0/limit"] == "`limit` must be > 0, got -1.0"
+    assert said["/contacts/0/limit"] == "`limit` must be > 0 N, got -1.0"
     assert "is not a key of a contact with the law `sliders`; known keys:" in said["/contacts/0/mu"]
     with pytest.raises(solver.SettingError, match=r"joint.limit.*must be a number > 0 and <= 1e15 \[N\]"):
         scene(limit=0.0)
