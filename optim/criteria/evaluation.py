@@ -18,7 +18,6 @@ from solver.balance.simplifications import Effects
 from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
-from solver.continuation.extrema.kernels.node_table import WORTH_POLISHING
 from solver.continuation.stretches import Course
 from solver.continuation.walk import ContinuationSettings
 from solver.results.watch import ShouldStop
@@ -60,7 +59,7 @@ def evaluate(
         earlier = [] if before is None else [one.branch for one in before.responses if one.case == case.name]
         highest = most / max(problem.weights[PEAK] * case.weight, 1e-300)
         settings = replace(SETTINGS, errors=errors, highest=highest)
-        settings = replace(settings, competes=WORTH_POLISHING) if errors else settings
+        settings = replace(settings, competes=0.0) if errors else settings
         found = _case(problem, case, values, known, earlier, gradients, settings, should_stop)
         responses += found[0]
         rows += found[1]

@@ -135,7 +135,7 @@ class ContinuationSettings:
     highest: float = math.inf
     peaks: bool = True
     unfinished_peaks: bool = True
-    competes: float = 5e-3
+    competes: float = 0.0
     errors: bool = True
 
     @property

@@ -80,7 +80,7 @@ def scenes(as_json: options.Json = False) -> None:
             str(len(scene.dofs)),
             ", ".join(contact.name for contact in scene.contacts),
             scene.observe.dof,
-            f"{units.span(scene.observe.band[0], scene.observe.band[1], 'Hz')}",
+            units.span(*scene.observe.band, "Hz"),
         )
         for scene in known
     ]
