@@ -144,19 +144,21 @@ _NUMERIC = re.compile(r"\b(Positive|NonNegative|Signed|Friction|Angle|Inclinatio
 def unit_of(place: Place, raw: Mapping[str, Any]) -> str | None:
     """The unit of the number at a place of a scene, by its key: empty of a plain one, None of no number."""
     keys = [step for step in place if isinstance(step, str)]
+    rows = [row for at, row in rows_of(dict(raw), keys[0]) if at == place[: len(at)]] if keys else []
     if keys[:2] == ["structure", "masses"] and len(keys) == 3:
         return "kg"
     if keys == ["excitation", "amplitude"]:
-        rows = [row for at, row in rows_of(dict(raw), "excitation") if at == place[: len(at)]]
         return "m" if any(row.get("ground") or row.get("driven") for row in rows) else "N"
+    for law in [laws().get(str(row.get("law"))) for row in rows if keys[0] == "contacts"]:
+        if law is not None and keys[-1] in law.PARAMETERS:
+            return law.PARAMETERS[keys[-1]].unit
     return _units_of_keys().get(keys[-1]) if keys else None
 
 
 @cache
 def _units_of_keys() -> dict[str, str]:
-    """The unit of every key of a number, as its class says it; of one key it is the same everywhere."""
+    """The unit of every key of a number, as its class says it: of one key the same but among laws."""
     found = {"load": "N", "speed": "1/min", "speed_order": "", "m": "kg"}
-    found |= {key: one.unit for law in laws().values() for key, one in law.PARAMETERS.items()}
     models = (model for _, model in (*_TABLES.values(), *_tables_of_kinds().values()))
     for key, (kind, words) in chain.from_iterable(every_field_said(model).items() for model in models):
         if _NUMERIC.search(kind) and not found.get(key):
@@ -201,10 +203,8 @@ def _field_issue(found: ErrorDetails, raw: dict[str, Any]) -> Issue:
         return Issue(place, f"= {quoted(last)} is not a key of {table}; {hint}")
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         # The key that tells the kinds of a table apart, and its words.
-        words = {
-            "contacts": ("law", tuple(laws())), "dampers": ("shape", tuple(SHAPES)),
-            "couplings": ("kind", tuple(coupling_kinds())),
-        }  # fmt: skip
+        words = {"contacts": ("law", tuple(laws())), "dampers": ("shape", tuple(SHAPES)),
+                 "couplings": ("kind", tuple(coupling_kinds()))}  # fmt: skip
         tag, tags = words.get(str(steps[0]) if steps else "", ("kind", KINDS))
         got = last.get(tag) if isinstance(last, dict) else None
         hint = nearest(got, tags) if isinstance(got, str) else ""

@@ -8,7 +8,9 @@ import pytest
 from each import each
 
 import solver
+from solver.contacts.laws.law_registry import laws
 from solver.results import units
+from solver.scene.validation import unit_of
 
 WRITTEN = [
     (7.93687e-7, "m", None, "0.7937 µm"), (2.35, "m", 7.2e-5, "2.35 m ± 72 µm"),
@@ -79,6 +81,14 @@ def test_a_value_may_have_the_unit_of_its_path() -> None:
     )  # type: ignore[dict-item]
     assert scene.value("wedge.angle") == pytest.approx(math.radians(25.0))
     assert scene.value("structure.blade_a") == pytest.approx(7e5)
+
+
+def test_the_unit_of_a_number_of_a_contact_is_that_of_its_law() -> None:
+    # `chi` is an exponent of Iwan's element and a time over a length of Hunt and Crossley's.
+    for law, found in laws().items():
+        row = {"contacts": [{"law": law}]}
+        said = {key: unit_of(("contacts", 0, key), row) for key in found.PARAMETERS}
+        assert said == {key: one.unit for key, one in found.PARAMETERS.items()}
 
 
 def test_names_that_look_like_quantities_stay_names() -> None:
