@@ -1,10 +1,11 @@
 """``/`` and ``/page/…``: the page, from the package; ``/docs``: the API for people, from its description.
 
-The modules of the page are sent as one, so that a browser asks once where it asked a hundred times: each
-becomes a function that runs once and returns what it exports, behind those that it imports: `import { a, b as
-c } from "./x.js"` is `const { a, b: c } = x`. What stands under `vendor` stays a file of its own, imported by
-its address. The page is written so that this is enough: imports are of names, in one line, exports are
-declarations that are never assigned again, and nothing goes in a circle.
+The modules of the page are sent as two scripts, so that a browser asks once where it asked a hundred times:
+one of all that the first look needs, one of what only `import("./x.js")` reaches, fetched when first asked
+for. Each module becomes a function that runs once and returns what it exports, behind those that it imports:
+`import { a, b as c } from "./x.js"` is `const { a, b: c } = x`. What stands under `vendor` stays a file of
+its own, imported by its address. The page is written so that this is enough: imports are of names, in one
+line, exports are declarations that are never assigned again, and nothing goes in a circle.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import hashlib
 import json
 import posixpath
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache, partial
 from html import escape
 from importlib import resources
@@ -43,13 +44,13 @@ _TYPES = {
 }
 _FOR_EVER = "public, max-age=31536000, immutable"
 _VERSION = "%VERSION%"
-_ENTRY, _SCRIPT, _STYLE = "js/main.js", "js/page.js", "css/page.css"
+_ENTRY, _SCRIPT, _LATER, _STYLE = "js/main.js", "js/page.js", "js/later.js", "css/page.css"
 _SHEET = re.compile(r'<link rel="stylesheet" href="/page/%VERSION%/css/([\w-]+\.css)">\n')
 
 
 @cache
 def files() -> dict[str, bytes]:
-    """Every file of the page by its path, and its modules and style sheets as one each; read once.
+    """Every file of the page by its path, its modules as two scripts and its sheets as one; read once.
 
     A folder of the lab has its view in `view.js`: they are modules of `js/lab/`, `js/lab.js` lists them.
     """
@@ -66,7 +67,7 @@ def files() -> dict[str, bytes]:
     imports = "".join(f'import {{ view as {room} }} from "./lab/{room}.js";\n' for room in views)
     found["js/lab.js"] = f"{imports}export const LAB = [{', '.join(views)}];\n".encode()
     texts = {path: data.decode() for path, data in found.items() if path.endswith(".js")}
-    found[_SCRIPT] = bundle(texts, _ENTRY).encode()
+    found |= {path: script.encode() for path, script in bundle(texts, _ENTRY).items()}
     sheets = _SHEET.findall(found["index.html"].decode())
     found[_STYLE] = b"".join(found[f"css/{name}"] for name in sheets)
     return found
@@ -221,53 +222,78 @@ def _words(text: str) -> str:
 
 _IMPORT = re.compile(r'^import \{([^}]*)\} from "([^"]+)";\n', re.MULTILINE)
 _EXPORT = re.compile(r"^export (?=(?:async )?(?:function\*?|const|class) (\w+))", re.MULTILINE)
-_LIST = re.compile(r"^export \{[^}]*\};\n", re.MULTILINE)
-_LATER = re.compile(r'\bimport\("[./]*(vendor/[^"]+)"\)')
-_OTHER = re.compile(r"^(?:import|export)\b.*", re.MULTILINE)
+_ON_DEMAND = re.compile(r'\bimport\("([^"]+)"\)')
+_OTHER = re.compile(r"^(?:import\b(?!\()|export\b).*", re.MULTILINE)
 VENDOR = "/vendor/"
 
 
-def bundle(files: Mapping[str, str], entry: str) -> str:
-    """Return one module that does what `entry` does.
+def bundle(files: Mapping[str, str], entry: str) -> dict[str, str]:
+    """Return the script that does what `entry` does, and that of what it imports on demand, by their paths.
 
-    ValueError for a module that is not there, goes in a circle or is written in another way.
+    ValueError for a module that is not there, goes in a circle, is imported both ways or is written in
+    another way.
 
     Parameters
     ----------
     files : the text of each module by its path.
-    entry : the path of the first; the bundle stands beside it.
+    entry : the path of the first; the scripts stand beside it.
     """
-    heads: dict[str, str] = {}
-    bodies: dict[str, str] = {}
+    made: dict[str, str] = {}  # of each module the script it is in
+    on_demand: list[str] = []
     under_way: list[str] = []
 
-    def add(path: str) -> None:
-        if path in under_way or path not in files:
-            what = "imports itself" if path in under_way else "is not there"
-            raise ValueError(f"the module {path!r} {what}: {' → '.join([*under_way, path])}")
-        under_way.append(path)
-        text = files[path]
-        lines = []
-        for names, source in _IMPORT.findall(text):
-            target = posixpath.normpath(posixpath.join(posixpath.dirname(path), source))
-            if VENDOR in target:
-                heads.setdefault(target, f'import * as {_name(target)} from "./{_beside(target, entry)}";')
-            elif target not in bodies:
-                add(target)
-            lines.append(f"const {{{names.replace(' as ', ': ')}}} = {_name(target)};")
-        body = _LATER.sub(r'import("./\1")', _LIST.sub("", _IMPORT.sub("", text)))
-        exported = ", ".join(_EXPORT.findall(body))
-        body = "\n".join([*lines, _EXPORT.sub("", body)])
-        odd = _OTHER.search(body)
-        if odd is not None:
-            raise ValueError(f"{path!r}: {odd[0]!r} is no import of names and no export of a declaration")
-        if path != entry:
-            body = f"const {_name(path)} = (() => {{\n{body}return {{ {exported} }};\n}})();"
-        bodies[path] = f"// {path}\n{body}"
-        under_way.pop()
+    def script(name: str, roots: Iterable[str]) -> str:
+        heads: dict[str, str] = {}
+        bodies: list[str] = []
 
-    add(entry)
-    return "\n".join([*heads.values(), *bodies.values()])
+        def add(path: str) -> None:
+            if path in under_way or path not in files:
+                what = "imports itself" if path in under_way else "is not there"
+                raise ValueError(f"the module {path!r} {what}: {' → '.join([*under_way, path])}")
+            under_way.append(path)
+            text = files[path]
+            lines = []
+            for names, source in _IMPORT.findall(text):
+                target = _target(path, source)
+                if VENDOR in target:
+                    heads[target] = f'import * as {_name(target)} from "./{_beside(target, entry)}";'
+                elif target == entry or target not in made:
+                    add(target)
+                elif made[target] != name:
+                    heads[target] = f'import {{ {_name(target)} }} from "./{_beside(made[target], entry)}";'
+                lines.append(f"const {{{names.replace(' as ', ': ')}}} = {_name(target)};")
+            body = _ON_DEMAND.sub(partial(later, path), _IMPORT.sub("", text))
+            exported = ", ".join(_EXPORT.findall(body))
+            body = "\n".join([*lines, _EXPORT.sub("", body)])
+            odd = _OTHER.search(body)
+            if odd is not None:
+                raise ValueError(f"{path!r}: {odd[0]!r} is no import of names and no export of a declaration")
+            if path != entry:
+                body = f"export const {_name(path)} = (() => {{\n{body}return {{ {exported} }};\n}})();"
+                under_way.pop()  # the entry stays: nothing imports it
+            bodies.append(f"// {path}\n{body}")
+            made[path] = name
+
+        for path in roots:
+            if made.get(path, name) != name:
+                raise ValueError(f"the module {path!r} is imported at once and on demand")
+            if path not in made:
+                add(path)
+        return "\n".join([*heads.values(), *bodies])
+
+    def later(path: str, found: re.Match[str]) -> str:
+        target = _target(path, found[1])
+        if VENDOR in target:
+            return f'import("./{_beside(target, entry)}")'
+        on_demand.append(target)
+        return f'import("./{_beside(_LATER, entry)}").then((all) => all.{_name(target)})'
+
+    # While the second is made, the list of what is on demand may grow.
+    return {_SCRIPT: script(_SCRIPT, [entry]), _LATER: script(_LATER, on_demand)}
+
+
+def _target(path: str, source: str) -> str:
+    return posixpath.normpath(posixpath.join(posixpath.dirname(path), source))
 
 
 def _name(path: str) -> str:

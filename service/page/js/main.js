@@ -4,12 +4,9 @@ import { asOneStep, lastWritten, on, read, state, tell, write } from "./base/sta
 import { button, byId, dropsOn, el, onFiles, options, show } from "./base/dom.js";
 import { saveToml } from "./base/exports.js";
 import { restoreTab, startFrame, startNotices, startTabs, startTheme, tabOf } from "./workbench/frame.js";
-import { edit, editCurrent, newScene } from "./editor/editor.js";
 import { Problem, patiently, post, watchStart } from "./network/api.js";
 import { forget, resume, run } from "./network/jobs.js";
 import { loadKinds, loadLaws } from "./scene/kinds.js";
-import { filesOf, openScene, sceneIn } from "./scene/files.js";
-import { openMatrices } from "./scene/matrices.js";
 import { asked, current, listScenes, loadScene, variedParts } from "./scene/scenes.js";
 import { fillSettings, startSettings } from "./scene/settings.js";
 import { contactTable, drawStructure } from "./scene/structure.js";
@@ -163,23 +160,29 @@ async function sweepAlone() {
   await run("sweep", asked(), { ...response, result: (result, ...more) => { response.result(result, ...more); showResponse(result); } }, response.priority);
 }
 
+// Fetched when they are first asked for.
+const editor = () => import("./editor/editor.js");
+const matrices = () => import("./scene/matrices.js");
+const sceneFiles = () => import("./scene/files.js");
+
 function controls() {
   const clicks = {
-    "open-file": () => byId("file").click(), "open-matrices": () => openMatrices(), "new-scene": () => newScene().catch(failed),
-    "edit-scene": () => editCurrent().catch(failed), "save-toml": () => saveToml(`${state.scene}.toml`), share,
+    "open-file": () => byId("file").click(), "open-matrices": () => matrices().then(({ openMatrices }) => openMatrices()).catch(failed),
+    "new-scene": () => editor().then(({ newScene }) => newScene()).catch(failed), "edit-scene": () => editor().then(({ editCurrent }) => editCurrent()).catch(failed), "save-toml": () => saveToml(`${state.scene}.toml`), share,
   };
   for (const [id, act] of Object.entries(clicks)) byId(id).addEventListener("click", act);
   byId("scene").addEventListener("change", () => change(byId("scene").value));
-  onFiles(byId("file"), take);
-  dropsOn(document.body, (given) => filesOf(given).then(take).catch(failed));
+  onFiles(byId("file"), (given) => take(given).catch(failed));
+  dropsOn(document.body, (given) => given.then(take).catch(failed));
   addEventListener("popstate", () => asOneStep(restore, { back: true }).catch(failed));
 }
 
 // Files that were chosen or dropped: a scene is opened, anything else is taken for matrices.
 async function take(files) {
+  const { openScene, sceneIn } = await sceneFiles();
   const scene = sceneIn(files);
   if (scene) await openScene(scene, files);
-  else if (files.length) openMatrices(files);
+  else if (files.length) (await matrices()).openMatrices(files);
 }
 
 async function share() {
@@ -241,5 +244,4 @@ async function start() {
   return begin();
 }
 
-export { current, edit };
-await start();
+start();

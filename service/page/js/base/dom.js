@@ -64,7 +64,24 @@ export const onFiles = (input, take) => input.addEventListener("change", () => {
   if (given.length) take(given);
 });
 
-// Files that are dropped on a card: it is marked while they are over it, and takes them alone.
+// Every file of what was dropped, those in folders too.
+async function filesOf(transfer) {
+  const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
+  if (!entries.some(({ isDirectory }) => isDirectory)) return [...transfer.files];
+  const inside = async (entry) => {
+    if (entry.isFile) return [await new Promise((resolve, reject) => { entry.file(resolve, reject); })];
+    const reader = entry.createReader();
+    const found = [];
+    for (;;) {
+      const some = await new Promise((resolve, reject) => { reader.readEntries(resolve, reject); });
+      if (!some.length) return (await Promise.all(found.map(inside))).flat();
+      found.push(...some);
+    }
+  };
+  return (await Promise.all(entries.map(inside))).flat();
+}
+
+// Files that are dropped on a card: it is marked while they are over it, and takes them alone, when they are known.
 export function dropsOn(card, take) {
   const over = (event, on) => {
     if (!event.dataTransfer?.types.includes("Files")) return;
@@ -76,7 +93,7 @@ export function dropsOn(card, take) {
   card.addEventListener("dragleave", (event) => over(event, false));
   card.addEventListener("drop", (event) => {
     over(event, false);
-    take(event.dataTransfer);
+    take(filesOf(event.dataTransfer));
   });
 }
 

@@ -24,7 +24,7 @@ export const dataPart = () => el("fieldset", { id: "identify-data" }, el("legend
 export function startData(onChange) {
   changed = onChange;
   onFiles(byId("identify-file"), takeFiles);
-  dropsOn(byId("identify-data"), (given) => takeFiles([...given.files]));
+  dropsOn(byId("identify-data"), (given) => given.then(takeFiles));
 }
 
 async function paste() {

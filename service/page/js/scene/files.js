@@ -126,23 +126,6 @@ export function matrixFiles(host, changed) {
 const REFERS = /^\s*(?:M|K|C|G|K_omega2|modes|mapping|diameters|nodes)\s*=\s*"(?!upload:)([^"\n]+)"|[{,]\s*nodes\s*=\s*"(?!upload:)([^"\n]+)"|"(?:M|K|C|G|K_omega2|modes|mapping|diameters|nodes)"\s*:\s*"(?!upload:)([^"\n]+)"/gm;
 const ownName = (path) => path.split(/[\\/]/).pop();
 
-// Every file of what was dropped, those in folders too.
-export async function filesOf(transfer) {
-  const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
-  if (!entries.some(({ isDirectory }) => isDirectory)) return [...transfer.files];
-  const inside = async (entry) => {
-    if (entry.isFile) return [await new Promise((resolve, reject) => { entry.file(resolve, reject); })];
-    const reader = entry.createReader();
-    const found = [];
-    for (;;) {
-      const some = await new Promise((resolve, reject) => { reader.readEntries(resolve, reject); });
-      if (!some.length) return (await Promise.all(found.map(inside))).flat();
-      found.push(...some);
-    }
-  };
-  return (await Promise.all(entries.map(inside))).flat();
-}
-
 export const sceneIn = (files) => files.find(({ name }) => SCENES.test(name));
 
 // Opens a scene; what it refers to is stored first, what is not among `files` is asked for.
