@@ -145,11 +145,9 @@ class Storage:
     """
 
     def __init__(
-        self,
-        repository: StorageRepository,
-        settings: ClientLimits,
+        self, repository: StorageRepository, settings: ClientLimits,
         steady: Callable[[], float] = time.monotonic,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._repository = repository
         self._settings = settings
         self._steady = steady

@@ -103,13 +103,9 @@ class Authenticator:
     """
 
     def __init__(
-        self,
-        keys: KeyRepository,
-        shares: Shares,
-        settings: Settings,
-        now: Clock,
+        self, keys: KeyRepository, shares: Shares, settings: Settings, now: Clock,
         steady: Callable[[], float] = time.monotonic,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._keys, self._shares = keys, shares
         self._settings = settings
         self._now = now

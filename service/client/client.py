@@ -147,13 +147,10 @@ class Client(Workbench):
             time.sleep(pause)
 
     def wait(
-        self,
-        job_id: str,
-        on_progress: Callable[[float, int], None] | None = None,
-        timeout: float | None = None,
-        on_points: Callable[[JobPoints], None] | None = None,
+        self, job_id: str, on_progress: Callable[[float, int], None] | None = None,
+        timeout: float | None = None, on_points: Callable[[JobPoints], None] | None = None,
         on_best: Callable[[dict[str, Any]], None] | None = None,
-    ) -> JobAnswer:
+    ) -> JobAnswer:  # fmt: skip
         """Follow a job until it has ended; with `timeout` [s] it may be unfinished still.
 
         Parameters

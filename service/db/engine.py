@@ -225,12 +225,9 @@ class Database:
     """
 
     def __init__(
-        self,
-        url: str,
-        connections: int = CONNECTIONS,
-        seconds: float = BUSY_TIMEOUT_SECONDS,
+        self, url: str, connections: int = CONNECTIONS, seconds: float = BUSY_TIMEOUT_SECONDS,
         arrays: str | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.url = url
         self.arrays = array_store(arrays)
         self._seconds = seconds

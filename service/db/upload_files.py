@@ -44,11 +44,9 @@ class UploadFiles:
     """
 
     def __init__(
-        self,
-        url: str,
-        reading: Callable[[], AbstractContextManager[Connection]],
+        self, url: str, reading: Callable[[], AbstractContextManager[Connection]],
         writing: Callable[[], AbstractContextManager[Connection]],
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._folder = files_beside(database_path(url)) if is_sqlite(url) else None
         self._reading, self._writing = reading, writing
 

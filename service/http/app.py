@@ -67,24 +67,14 @@ def create_app(
             await run_in_threadpool(service.stop)
 
     app = _App(
-        title="stickslip",
-        description=_DESCRIPTION,
-        version=SOLVER_VERSION,
-        lifespan=lifespan,
-        docs_url=None,
-        openapi_url=None,
-        generate_unique_id_function=lambda route: route.name,
-        redoc_url=None,
+        title="stickslip", description=_DESCRIPTION, version=SOLVER_VERSION, lifespan=lifespan, docs_url=None,
+        openapi_url=None, redoc_url=None, generate_unique_id_function=lambda route: route.name,
         telemetry={
-            "tracing": service.settings.traces,
-            "operation_spans": False,
-            "metrics": False,
-            "logs": False,
-            "auto_configure": False,
+            "tracing": service.settings.traces, "operation_spans": False, "metrics": False, "logs": False,
             # One may have the secret of a link in its address, which no trace is to tell.
-            "exclude": lambda scope: by_link(scope.get("path", "")),
+            "auto_configure": False, "exclude": lambda scope: by_link(scope.get("path", "")),
         },
-    )
+    )  # fmt: skip
     _guard(app, service, connections or Connections.of(service.settings))
     events.install(app)
     # What a path that is a route's own may be asked by: a parameter of another route might fit it too.

@@ -41,11 +41,9 @@ class Constant:
     """
 
     def __init__(
-        self,
-        make: Callable[[], bytes],
-        media_type: str = "application/json",
+        self, make: Callable[[], bytes], media_type: str = "application/json",
         headers: Mapping[str, str] | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._make, self._media_type, self._headers = make, media_type, headers or {}
         self._lock = threading.Lock()
         self._made: Future[tuple[bytes, bytes, str]] | None = None

@@ -86,13 +86,9 @@ class Division:
     join: Join
 
     def run(
-        self,
-        spec: Mapping[str, Any],
-        progress: OnProgress,
-        should_stop: ShouldStop,
-        known: Mapping[int, PartOutput] | None = None,
-        on_part: OnPart = _not_kept,
-    ) -> JobOutput:
+        self, spec: Mapping[str, Any], progress: OnProgress, should_stop: ShouldStop,
+        known: Mapping[int, PartOutput] | None = None, on_part: OnPart = _not_kept,
+    ) -> JobOutput:  # fmt: skip
         """Compute the parts, here and by who helps, and join them: the `run` of the kind.
 
         PartStoppedError if it was told to stop.

@@ -193,12 +193,9 @@ class Elsewhere:
     """
 
     def __init__(
-        self,
-        waiters: Waiters,
-        here: Callable[[str], Live | None],
-        ask: Callable[[str], None],
+        self, waiters: Waiters, here: Callable[[str], Live | None], ask: Callable[[str], None],
         tell: Callable[[str], None],
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._waiters, self._here = waiters, here
         self._ask, self._tell = ask, tell
         self._lock = threading.Lock()

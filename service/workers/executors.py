@@ -33,15 +33,9 @@ class LocalExecutor:
     """
 
     def __init__(
-        self,
-        runs: Mapping[str, RunOn],
-        warm_up: WarmUp,
-        *,
-        workers: int,
-        grace_seconds: float,
-        pace: Pace,
+        self, runs: Mapping[str, RunOn], warm_up: WarmUp, *, workers: int, grace_seconds: float, pace: Pace,
         limits: ProcessLimits = UNLIMITED,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.runs = runs
         self.warm_up = warm_up
         self.grace_seconds = grace_seconds

@@ -66,15 +66,10 @@ class Spreading:
         self._numbers = 0
 
     def __call__(
-        self,
-        function: Callable[..., Any],
-        calls: Sequence[tuple[Any, ...]],
-        done: Callable[[int, Any], bool],
-        *,
-        should_stop: Callable[[], bool],
-        here: Callable[[int], Any] | None = None,
-        seconds: float | None = None,
-    ) -> None:
+        self, function: Callable[..., Any], calls: Sequence[tuple[Any, ...]],
+        done: Callable[[int, Any], bool], *, should_stop: Callable[[], bool],
+        here: Callable[[int], Any] | None = None, seconds: float | None = None,
+    ) -> None:  # fmt: skip
         """Compute the calls; see `Spread`."""
         name = function.func if isinstance(function, partial) else function
         if seconds is not None:

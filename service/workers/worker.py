@@ -254,13 +254,9 @@ class _Neighbours:
 
 
 def main(
-    connection: Connection,
-    numbers: Array[ctypes.c_longlong],
-    runs: Mapping[str, RunOn],
-    warm_up: WarmUp,
-    pace: Pace,
-    limits: ProcessLimits,
-) -> None:
+    connection: Connection, numbers: Array[ctypes.c_longlong], runs: Mapping[str, RunOn], warm_up: WarmUp,
+    pace: Pace, limits: ProcessLimits,
+) -> None:  # fmt: skip
     """The life of a worker process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _leave_soon)
@@ -340,13 +336,9 @@ def _die_with_parent() -> None:
 
 
 def _compute(
-    runs: Mapping[str, RunOn],
-    task: Task,
-    progress: Throttle,
-    stop: _Stop,
-    kept: Checkpoints,
+    runs: Mapping[str, RunOn], task: Task, progress: Throttle, stop: _Stop, kept: Checkpoints,
     limits: ProcessLimits,
-) -> Done:
+) -> Done:  # fmt: skip
     """Run one task; every error becomes an answer, the process lives on."""
     try:
         if task.kind not in runs:

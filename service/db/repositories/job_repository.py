@@ -145,15 +145,9 @@ class JobRepository:
             return {row["id"]: JobRow(**row) for row in rows}
 
     def page(
-        self,
-        limit: int = 100,
-        before: str | None = None,
-        *,
-        owner: str | None = NOBODY,
-        state: JobState | None = None,
-        kind: str | None = None,
-        scene: str | None = None,
-    ) -> list[JobRow]:
+        self, limit: int = 100, before: str | None = None, *, owner: str | None = NOBODY,
+        state: JobState | None = None, kind: str | None = None, scene: str | None = None,
+    ) -> list[JobRow]:  # fmt: skip
         """Jobs outside of the bin, of an owner or of everybody (None), newest first, older than `before`."""
         query = select(*_LISTED).where(~in_the_bin(Job.id)).order_by(Job.id.desc()).limit(limit)
         if before is not None:
@@ -238,15 +232,9 @@ class JobRepository:
             return _guarded(connection, attempts.REPORT, attempt, values)
 
     def keep(
-        self,
-        attempt: Attempt,
-        pieces: Sequence[ResultPiece],
-        fraction: float,
-        points: int,
-        lease_until: datetime,
-        *,
-        anew: bool = False,
-    ) -> bool:
+        self, attempt: Attempt, pieces: Sequence[ResultPiece], fraction: float, points: int,
+        lease_until: datetime, *, anew: bool = False,
+    ) -> bool:  # fmt: skip
         """Store pieces for a later attempt, with progress and lease; False if the job is owned no more.
 
         A waiting job with points is one with a checkpoint: there is at least one point then.

@@ -342,14 +342,9 @@ class Projects(Binned[Project], Rows[Project]):
             return self._insert(connection, row)
 
     def page(
-        self,
-        limit: int,
-        before: str | None = None,
-        *,
-        owner: str | None = None,
-        text: str | None = None,
+        self, limit: int, before: str | None = None, *, owner: str | None = None, text: str | None = None,
         deleted: bool = False,
-    ) -> list[Project]:
+    ) -> list[Project]:  # fmt: skip
         """Projects of an owner, or of everybody (None), newest first, older than the project `before`."""
         holds: list[ColumnElement[bool]] = [
             Project.deleted.is_not(None) if deleted else Project.deleted.is_(None)
