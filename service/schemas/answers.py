@@ -20,6 +20,7 @@ from service.jobs.stored_figures import DESIGN, SWEEP, DesignRecord, Quantity, S
 from service.settings.settings import Settings
 from solver.contacts.laws.law_registry import DEFAULT, laws
 from solver.scene.json_schema import scene_schema
+from solver.scene.toml import shipped_text
 
 if TYPE_CHECKING:
     from service.queue.core import Results, WholeDesign
@@ -350,6 +351,7 @@ class SceneAnswer(AnswerModel):
     owner: str = Field(description="Whose it is; a shipped scene is everybody's.")
     name: str
     shipped: bool
+    title: str | None = Field(description="What a shipped scene is, in a line.")
     scene_hash: str
     created: datetime | None
     links: dict[str, str]
@@ -357,7 +359,12 @@ class SceneAnswer(AnswerModel):
     @classmethod
     def of(cls, row: StoredScene, **more: Any) -> Self:
         """The answer for a scene."""
-        return cls._from(row, links={"self": f"/v1/scenes/{row.name}"}, **more)
+        title = (
+            shipped_text(row.name).removeprefix("# ").partition(":")[0].partition("\n")[0]
+            if row.shipped
+            else None
+        )
+        return cls._from(row, title=title, links={"self": f"/v1/scenes/{row.name}"}, **more)
 
 
 class SceneDetail(SceneAnswer):

@@ -55,9 +55,10 @@ class TemplateList(AnswerModel):
 
 
 class TemplateScene(AnswerModel):
-    """The tables of a scene."""
+    """The tables of a scene, and the same as a file with comments, as `stickslip new` writes it."""
 
     scene: dict[str, Any]
+    text: str
 
 
 @templates.get("/templates", response_model=TemplateList)
@@ -84,7 +85,8 @@ async def fill_template(body: FillBody) -> TemplateScene:
     if body.template not in names:
         raise InvalidRequestError.of(("template",), f"must be one of {', '.join(names)}", body.template)
     try:
-        return TemplateScene(scene=_known.template_tables(body.template, body.answers))
+        scene = _known.template_tables(body.template, body.answers)
+        return TemplateScene(scene=scene, text=_known.commented(body.template, scene))
     except SceneError as error:
         raise InvalidRequestError([one.below("answers") for one in error.issues]) from error
 

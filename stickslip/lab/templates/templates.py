@@ -6,22 +6,28 @@ All templates share a blade with one mode, its excitation, and how a scene is pu
 from __future__ import annotations
 
 import math
+import re
 from abc import abstractmethod
+from collections import Counter
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from solver.errors import Issue, SceneError
+from solver.scene.descriptions import WORDS
 from solver.scene.json_schema import plain, words_of
 from solver.scene.scene import Scene
-from solver.scene.validation import field_issues
+from solver.scene.scene_records import LAW_TAG
+from solver.scene.toml import toml_text
+from solver.scene.validation import field_issues, table_of
 
 Word = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+\z", max_length=100)]
 # The least is small enough for every unit, and large enough for squares and quotients to be told.
 Size = Annotated[float, Field(strict=True, ge=1e-9, le=1e15, allow_inf_nan=False)]
 BLADE = "blade"
 """The DOF of the mode that vibrates."""
+_WIDEST = 100
 _BELOW, _ABOVE = 0.8, 1.2
 """The band reaches so far beyond the frequencies of the blade with its contact loose and stuck."""
 
@@ -370,6 +376,33 @@ def template_tables(name: str, answers: Mapping[str, Any]) -> dict[str, Any]:
         return template.model_validate(dict(answers)).tables()
     except ValidationError as error:
         raise SceneError(field_issues(error, dict(answers))) from error
+
+
+def commented(template: str, tables: Mapping[str, Any]) -> str:
+    """The tables of a scene made of a template as a file with comments."""
+    head = f'{TEMPLATES[template].TITLE}. Numbers are in SI units, or texts with a unit: "0.2 mm", "35 deg".'
+    lines, seen, words = [], Counter[str](), dict[str, str]()
+    for line in toml_text(tables, (head,)).splitlines():
+        if header := re.fullmatch(r"\[+(\w+)\]+", line):
+            row = tables[header[1]]
+            row = row[seen[header[1]]] if isinstance(row, list) else row
+            seen[header[1]] += 1
+            words = WORDS["*"] | words_of(table_of((header[1], *_kind(row), ""))[1])
+        said = words.get(line.partition(" = ")[0], "").partition(". ")[0].removesuffix(".")
+        if not said or said.startswith("As of"):
+            lines.append(line)
+        elif len(line) + len(said) < _WIDEST:
+            lines.append(f"{line} # {said}")
+        else:
+            lines += [f"# {said}:", line]
+    return "\n".join(lines) + "\n"
+
+
+def _kind(row: Mapping[str, Any]) -> tuple[str, ...]:
+    """What tells the kinds of a table apart."""
+    if "law" in row and "shape" not in row:
+        return (LAW_TAG + row["law"],)
+    return tuple(row[key] for key in ("kind", "shape") if key in row)
 
 
 def new_scene(template: str, **answers: Any) -> Scene:
