@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import math
+import re
 import threading
 import time
 from collections.abc import Mapping
@@ -56,6 +57,10 @@ log = logging.getLogger("stickslip.service")
 SOLVER_VERSION = version("stickslip")
 
 _LOOK_AGAIN_SECONDS = 2.0
+FIRST_KERNELS = 190
+"""About so many are compiled before a worker begins; which ones is found on the way."""
+_LEAST_KERNELS = 5
+"""Seen compiled before it is said how long the rest takes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,6 +76,26 @@ class Results:
         """The result."""
         found: dict[str, Any] = json.loads(self.text)
         return found
+
+
+@dataclass(slots=True)
+class Compiler:
+    """How far the process is that compiles, by what was seen of it."""
+
+    done: int = 0
+    of: int = FIRST_KERNELS
+    first: tuple[int, float] | None = None
+
+    def look(self) -> float | None:
+        """Look anew; the seconds that the rest takes at the pace seen so far, None while it is unknown."""
+        found, now = re.match(r"(\d+) of (\d+)", compiler_process.told()), time.monotonic()
+        if found:
+            self.done, self.of = int(found[1]), max(self.of, int(found[2]))
+            self.first = self.first or (self.done, now)
+        before, since = self.first or (0, now)
+        if self.done - before < _LEAST_KERNELS or self.done >= self.of:
+            return None
+        return (self.of - self.done) * (now - since) / (self.done - before)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,6 +152,7 @@ class Service:
         self.stopping = threading.Event()
         self.compiling = False
         """Whether workers wait for their kernels, and what somebody waits for is interpreted."""
+        self.compiler = Compiler()
         self._open = False
 
     def _make_notices(self) -> Notices:
@@ -208,12 +234,9 @@ class Service:
         self.waiters.wake_all()
 
     def submit(
-        self,
-        body: Mapping[str, Any],
-        idempotency_key: str | None = None,
-        caller: Caller = KEYLESS,
+        self, body: Mapping[str, Any], idempotency_key: str | None = None, caller: Caller = KEYLESS,
         checked: tuple[JobRequest, Prepared] | None = None,
-    ) -> tuple[JobRow, bool]:
+    ) -> tuple[JobRow, bool]:  # fmt: skip
         """Accept a job of the caller's; whether it is new, and not made before under its idempotency key.
 
         Parameters
@@ -340,12 +363,9 @@ class Service:
         return WholeDesign(row=row, job=job, result=result)
 
     def wait(
-        self,
-        job_id: str,
-        timeout: float | None = None,
-        on_progress: OnProgress | None = None,
+        self, job_id: str, timeout: float | None = None, on_progress: OnProgress | None = None,
         caller: Caller = KEYLESS,
-    ) -> JobRow:
+    ) -> JobRow:  # fmt: skip
         """Wait in this thread until a job has ended, the time [s] is over or the service stops."""
         events: SimpleQueue[Event] = SimpleQueue()
         end = math.inf if timeout is None else time.monotonic() + timeout

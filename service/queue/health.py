@@ -5,16 +5,29 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Callable
+from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.db import revisions
 from service.db.engine import sqlite_note
 from service.queue.core import SOLVER_VERSION, Service
-from solver.jit.compiler_process import told
+from solver.jit.compiler_process import missing, told
 
 _PROBE_SECONDS = 2.0
+_MOST_NAMED = 3
+"""Workers that are told apart; more are one part."""
+
+
+class Part(BaseModel):
+    """A part of the service, and how far its start is; what is not known is left out."""
+
+    name: str
+    state: Literal["waits", "compiles", "ready"]
+    done: int | None = Field(default=None, description="Kernels that are compiled.")
+    of: int | None = Field(default=None, description="Kernels that the first start of a version compiles.")
+    seconds_left: float | None = Field(default=None, description="At the pace of those compiled so far.")
 
 
 class Readiness(BaseModel):
@@ -24,21 +37,14 @@ class Readiness(BaseModel):
 
     ready: bool
     starting: str | None = None
+    parts: list[Part] = []
 
 
 class Health(Readiness):
-    """How the service is.
+    """How the service is."""
 
-    Attributes
-    ----------
-    trouble : list of str
-        Why not.
-    notes : list of str
-        What its keeper should know although it works.
-    """
-
-    trouble: list[str]
-    notes: list[str]
+    trouble: list[str] = Field(description="Why not.")
+    notes: list[str] = Field(description="What its keeper should know although it works.")
     version: str
     database: str
     database_version: str
@@ -133,7 +139,7 @@ def _health(service: Service, trouble: list[str], counts: dict[str, int], versio
         workers.trouble if workers.ready else None,
     ]
     return Health(
-        ready=not trouble, starting=_starting(service), trouble=trouble,
+        ready=not trouble, starting=_starting(service), parts=parts(service), trouble=trouble,
         notes=[note for note in notes if note is not None], version=SOLVER_VERSION,
         database=service.database.backend, database_version=version, revision=revisions.head_revision(),
         workers=workers.workers, workers_ready=workers.ready, workers_busy=workers.busy, jobs=counts,
@@ -148,7 +154,8 @@ def readiness(service: Service) -> Readiness:
     except (SQLAlchemyError, OSError):
         return Readiness(ready=False)
     up = service.compiling or service.queue.status().ready > 0
-    return Readiness(ready=service.queue.alive and up, starting=_starting(service))
+    ready = service.queue.alive and up
+    return Readiness(ready=ready, starting=_starting(service), parts=parts(service))
 
 
 def _starting(service: Service) -> str | None:
@@ -156,3 +163,20 @@ def _starting(service: Service) -> str | None:
     if not service.compiling:
         return None
     return f"Being compiled, once for this version: {told()}. Until then curves take longer and jobs wait."
+
+
+def parts(service: Service) -> list[Part]:
+    """Say of each part of the service how far its start is."""
+    status, compiling = service.queue.status(), service.compiling and missing()
+    names, ready = [f"Worker {i + 1}" for i in range(status.workers)], status.ready
+    if status.workers > _MOST_NAMED:
+        names, ready = [f"{status.workers} workers"], int(ready == status.workers)
+    found = [Part(name="Service and store", state="ready")]
+    for i, name in enumerate(names):
+        if compiling and i == 0:
+            left, far = service.compiler.look(), service.compiler
+            found.append(Part(name=name, state="compiles", done=far.done, of=far.of, seconds_left=left))
+        else:
+            found.append(Part(name=name, state="ready" if i < ready else "waits"))
+    curves = service.previews.ready > 0 and not service.compiling
+    return [*found, Part(name="Live curves", state="ready" if curves else "waits")]

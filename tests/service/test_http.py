@@ -244,7 +244,10 @@ def test_health_and_description(http: httpx.Client) -> None:
 def test_scenes(http: httpx.Client) -> None:
     listed = {scene["name"]: scene for scene in http.get("/v1/scenes").json()["items"]}
     assert listed["two-dof"]["shipped"]
-    assert listed["two-dof"]["title"] == "Two masses in a chain, a friction damper from the second to the ground."
+    assert (
+        listed["two-dof"]["title"]
+        == "Two masses in a chain, a friction damper from the second to the ground."
+    )
     assert all(0 < len(one["title"]) < 110 for one in listed.values() if one["shipped"])
     scene = http.get("/v1/scenes/two-dof").json()["scene"]
     is_problem(http.get("/v1/scenes/..%2Ftwo-dof"), 404)

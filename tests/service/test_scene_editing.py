@@ -76,7 +76,9 @@ def test_templates_ask_and_make_scenes(shipped: httpx.Client) -> None:
         made = shipped.post("/v1/templates", json={"template": one["name"]}).json()
         assert edit(shipped, text="", scene=made["scene"])["issues"] == []
         assert made["text"].count("#") > 10
-        assert edit(shipped, text=made["text"])["scene"] == edit(shipped, text="", scene=made["scene"])["scene"]
+        assert (
+            edit(shipped, text=made["text"])["scene"] == edit(shipped, text="", scene=made["scene"])["scene"]
+        )
     refused = shipped.post("/v1/templates", json={"template": "shroud", "answers": {"mu": -1, "muu": 2}})
     assert {one["pointer"] for one in is_problem(refused, 422)["errors"]} == {"/answers/muu"}
     refused = shipped.post("/v1/templates", json={"template": "shroud", "answers": {"mu": -1}})

@@ -6,7 +6,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -25,7 +25,8 @@ from service.http.middleware.connections import Connections
 from service.http.server import _bind, _config, _Opening, _Server
 from service.jobs.kind_registry import JobKind, Registry
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
-from service.queue.health import readiness
+from service.queue.core import FIRST_KERNELS, Compiler
+from service.queue.health import Part, readiness
 from service.workers import processes
 from service.workers.warm_pool import Previews
 from solver.jit import compiler_process
@@ -76,16 +77,68 @@ def test_previews_begin_interpreted_and_go_over_to_compiled_kernels(
         folder.cache_clear()
 
 
-@pytest.mark.parametrize(("compiling", "ready"), [(False, 0), (True, 0), (False, 1)])
-def test_readiness_says_what_is_being_started(compiling: bool, ready: int) -> None:
-    service: Any = SimpleNamespace(
-        compiling=compiling, settings=SimpleNamespace(least_free_bytes=0),
-        database=SimpleNamespace(trouble=lambda _: None),
-        queue=SimpleNamespace(alive=True, status=lambda: SimpleNamespace(ready=ready)),
+@pytest.fixture
+def uncompiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A folder of kernels without any."""
+    monkeypatch.delenv(compiler_process.SETTING, raising=False)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    folder.cache_clear()
+    yield
+    folder.cache_clear()
+
+
+def begun(compiling: bool, ready: int, workers: int = 2) -> Any:
+    status = SimpleNamespace(ready=ready, workers=workers)
+    return SimpleNamespace(
+        compiling=compiling, compiler=Compiler(), settings=SimpleNamespace(least_free_bytes=0),
+        database=SimpleNamespace(trouble=lambda _: None), previews=SimpleNamespace(ready=ready),
+        queue=SimpleNamespace(alive=True, status=lambda: status),
     )  # fmt: skip
-    found = readiness(service)
+
+
+@pytest.mark.parametrize(
+    ("compiling", "ready", "states"),
+    [
+        (False, 0, ["ready", "waits", "waits", "waits"]),
+        (True, 0, ["ready", "compiles", "waits", "waits"]),
+        (False, 1, ["ready", "ready", "waits", "ready"]),
+        (False, 2, ["ready", "ready", "ready", "ready"]),
+    ],
+)
+@pytest.mark.usefixtures("uncompiled")
+def test_readiness_says_what_is_being_started(compiling: bool, ready: int, states: list[str]) -> None:
+    found = readiness(begun(compiling, ready))
     assert found.ready is (compiling or ready > 0)
     assert ("compiled" in (found.starting or "")) is compiling
+    assert [part.name for part in found.parts] == ["Service and store", "Worker 1", "Worker 2", "Live curves"]
+    assert [part.state for part in found.parts] == states
+
+
+@pytest.mark.parametrize(("ready", "state"), [(15, "waits"), (16, "ready")])
+def test_many_workers_are_one_part(ready: int, state: str) -> None:
+    _, workers, _ = readiness(begun(False, ready, 16)).parts
+    assert (workers.name, workers.state) == ("16 workers", state)
+
+
+@pytest.mark.usefixtures("uncompiled")
+def test_how_long_the_compiler_takes_follows_from_what_it_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 100.0
+    monkeypatch.setattr("service.queue.core.time.monotonic", lambda: now)
+    service = begun(True, 0)
+
+    def worker() -> Part:
+        return readiness(service).parts[1]
+
+    assert (worker().done, worker().of, worker().seconds_left) == (0, FIRST_KERNELS, None)
+    compiler_process.note(10, 14)
+    assert worker().seconds_left is None, "no pace is seen yet"
+    now = 120.0
+    compiler_process.note(30, 44)
+    assert worker().seconds_left == pytest.approx(FIRST_KERNELS - 30)  # one a second
+    compiler_process.note(FIRST_KERNELS + 5, FIRST_KERNELS + 10)
+    assert worker().of == FIRST_KERNELS + 10
+    compiler_process.note(FIRST_KERNELS + 10, FIRST_KERNELS + 10)
+    assert worker().seconds_left is None, "whether more are found is not known"
 
 
 def test_a_server_lives_while_its_service_is_loaded(make_settings: MakeSettings) -> None:
