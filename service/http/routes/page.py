@@ -14,11 +14,10 @@ import hashlib
 import json
 import posixpath
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial
 from html import escape
-from importlib import resources
-from importlib.resources.abc import Traversable
+from pathlib import Path
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
@@ -42,6 +41,7 @@ _TYPES = {
     ".css": "text/css; charset=utf-8",
     ".svg": "image/svg+xml",
 }
+_FOLDER = Path(__file__).resolve().parents[2] / "page"
 _FOR_EVER = "public, max-age=31536000, immutable"
 _VERSION = "%VERSION%"
 _ENTRY, _SCRIPT, _LATER, _STYLE = "js/main.js", "js/page.js", "js/later.js", "css/page.css"
@@ -54,22 +54,15 @@ def files() -> dict[str, bytes]:
 
     A folder of the lab has its view in `view.js`: they are modules of `js/lab/`, `js/lab.js` lists them.
     """
-    found: dict[str, bytes] = {}
-    pending: list[tuple[str, Traversable]] = [("", resources.files("service") / "page")]
-    while pending:
-        path, item = pending.pop()
-        if item.is_dir():
-            pending.extend((f"{path}/{child.name}".lstrip("/"), child) for child in item.iterdir())
-        elif path[path.rfind(".") :] in _TYPES:
-            found[path] = item.read_bytes()
+    kept = [path for path in _FOLDER.rglob("*") if path.suffix in _TYPES]
+    found = {path.relative_to(_FOLDER).as_posix(): path.read_bytes() for path in kept}
     views = files_of("view.js")
     found |= {f"js/lab/{room}.js": view for room, view in views.items()}
     imports = "".join(f'import {{ view as {room} }} from "./lab/{room}.js";\n' for room in views)
     found["js/lab.js"] = f"{imports}export const LAB = [{', '.join(views)}];\n".encode()
     texts = {path: data.decode() for path, data in found.items() if path.endswith(".js")}
     found |= {path: script.encode() for path, script in bundle(texts, _ENTRY).items()}
-    sheets = _SHEET.findall(found["index.html"].decode())
-    found[_STYLE] = b"".join(found[f"css/{name}"] for name in sheets)
+    found[_STYLE] = b"".join(found[f"css/{name}"] for name in _SHEET.findall(found["index.html"].decode()))
     return found
 
 
@@ -109,8 +102,7 @@ async def ways_in(context: InContext) -> dict[str, str | None]:
 async def file(hashed: str, path: str, request: Request) -> Response:
     """A file of the page; one asked for by the address of another version is not kept."""
     await INDEX.answer(request)  # the files are read with it
-    found = _constants().get(path)
-    if found is None:
+    if (found := _constants().get(path)) is None:
         raise NotFoundError(f"there is nothing at {request.url.path}")
     return await found.answer(request, {"Cache-Control": _FOR_EVER if hashed == version() else "no-cache"})
 
@@ -118,7 +110,9 @@ async def file(hashed: str, path: str, request: Request) -> Response:
 @cache
 def _constants() -> dict[str, Constant]:
     made = {path: partial(bytes, data) for path, data in files().items() if path != "index.html"}
-    return {path: Constant(make, _TYPES[path[path.rfind(".") :]], _HEADERS) for path, make in made.items()}
+    return {
+        path: Constant(make, _TYPES[posixpath.splitext(path)[1]], _HEADERS) for path, make in made.items()
+    }
 
 
 docs = APIRouter(prefix="/docs", tags=["health"])
@@ -167,11 +161,8 @@ def _page(description: dict[str, Any]) -> Iterator[str]:
     yield '<link rel="stylesheet" href="/docs/style.css"></head><body>'
     yield f"<h1>{escape(info['title'])} {escape(info['version'])}</h1><p>{escape(info['description'])} "
     yield 'For programs: <a href="/openapi.json">openapi.json</a>.</p><ul>'
-    operations = [
-        (method, path, operation)
-        for path, methods in description["paths"].items()
-        for method, operation in methods.items()
-    ]
+    paths = description["paths"].items()
+    operations = [(method, path, one) for path, methods in paths for method, one in methods.items()]
     for method, path, operation in operations:
         yield f'<li><a href="#{escape(operation["operationId"])}">{method.upper()} {escape(path)}</a></li>'
     yield "</ul>"
@@ -183,10 +174,8 @@ def _page(description: dict[str, Any]) -> Iterator[str]:
 def _operation(method: str, path: str, operation: dict[str, Any], whole: dict[str, Any]) -> Iterator[str]:
     yield f'<h2 id="{escape(operation["operationId"])}"><span class="method">{method}</span> '
     yield f"<code>{escape(path)}</code></h2>"
-    for paragraph in operation.get("description", "").split("\n\n"):
-        yield f"<p>{_words(paragraph)}</p>"
-    parameters = operation.get("parameters", ())
-    if parameters:
+    yield from (f"<p>{_words(paragraph)}</p>" for paragraph in operation.get("description", "").split("\n\n"))
+    if parameters := operation.get("parameters", ()):
         yield "<h3>Parameters</h3><table>"
         for one in parameters:
             text = one.get("description") or one["schema"].get("description", "")
@@ -205,9 +194,8 @@ def _operation(method: str, path: str, operation: dict[str, Any], whole: dict[st
 
 def _examples(content: dict[str, Any], whole: dict[str, Any]) -> Iterator[str]:
     """The examples of a body, then its schema."""
-    found = [example["value"] for example in content.get("examples", {}).values()]
-    for example in found:
-        yield f"<pre>{escape(json.dumps(example, indent=1))}</pre>"
+    for example in content.get("examples", {}).values():
+        yield f"<pre>{escape(json.dumps(example['value'], indent=1))}</pre>"
     schema = content["schema"]
     if "$ref" in schema:
         schema = whole["components"]["schemas"][schema["$ref"].rpartition("/")[2]]
@@ -216,33 +204,27 @@ def _examples(content: dict[str, Any], whole: dict[str, Any]) -> Iterator[str]:
 
 def _words(text: str) -> str:
     """Text with what stands between backticks as code."""
-    pieces = escape(text).split("`")
-    return "".join(f"<code>{piece}</code>" if index % 2 else piece for index, piece in enumerate(pieces))
+    return re.sub("`([^`]*)`", r"<code>\1</code>", escape(text))
 
 
 _IMPORT = re.compile(r'^import \{([^}]*)\} from "([^"]+)";\n', re.MULTILINE)
 _EXPORT = re.compile(r"^export (?=(?:async )?(?:function\*?|const|class) (\w+))", re.MULTILINE)
 _ON_DEMAND = re.compile(r'\bimport\("([^"]+)"\)')
 _OTHER = re.compile(r"^(?:import\b(?!\()|export\b).*", re.MULTILINE)
-VENDOR = "/vendor/"
 
 
 def bundle(files: Mapping[str, str], entry: str) -> dict[str, str]:
-    """Return the script that does what `entry` does, and that of what it imports on demand, by their paths.
+    """Return by their paths the script of what `entry` imports, and that of what is imported on demand.
 
-    ValueError for a module that is not there, goes in a circle, is imported both ways or is written in
-    another way.
-
-    Parameters
-    ----------
-    files : the text of each module by its path.
-    entry : the path of the first; the scripts stand beside it.
+    ValueError for a module that is not there, goes in a circle, is imported both ways or is written
+    otherwise. `files` has the text of each module by its path; the scripts stand beside `entry`.
     """
-    made: dict[str, str] = {}  # of each module the script it is in
+    beside = partial(posixpath.relpath, start=posixpath.dirname(entry))
+    place: dict[str, str] = {}  # the script that a module is in
     on_demand: list[str] = []
     under_way: list[str] = []
 
-    def script(name: str, roots: Iterable[str]) -> str:
+    def script(own: str, roots: list[str]) -> str:
         heads: dict[str, str] = {}
         bodies: list[str] = []
 
@@ -251,54 +233,43 @@ def bundle(files: Mapping[str, str], entry: str) -> dict[str, str]:
                 what = "imports itself" if path in under_way else "is not there"
                 raise ValueError(f"the module {path!r} {what}: {' → '.join([*under_way, path])}")
             under_way.append(path)
-            text = files[path]
             lines = []
-            for names, source in _IMPORT.findall(text):
-                target = _target(path, source)
-                if VENDOR in target:
-                    heads[target] = f'import * as {_name(target)} from "./{_beside(target, entry)}";'
-                elif target == entry or target not in made:
+            for names, source in _IMPORT.findall(files[path]):
+                target = posixpath.normpath(f"{path}/../{source}")
+                if "/vendor/" in target:
+                    heads[target] = f'import * as {_name(target)} from "./{beside(target)}";'
+                elif target not in place:
                     add(target)
-                elif made[target] != name:
-                    heads[target] = f'import {{ {_name(target)} }} from "./{_beside(made[target], entry)}";'
+                elif place[target] != own:
+                    heads[target] = f'import {{ {_name(target)} }} from "./{beside(place[target])}";'
                 lines.append(f"const {{{names.replace(' as ', ': ')}}} = {_name(target)};")
-            body = _ON_DEMAND.sub(partial(later, path), _IMPORT.sub("", text))
+            body = _ON_DEMAND.sub(partial(later, path), _IMPORT.sub("", files[path]))
             exported = ", ".join(_EXPORT.findall(body))
             body = "\n".join([*lines, _EXPORT.sub("", body)])
-            odd = _OTHER.search(body)
-            if odd is not None:
+            if odd := _OTHER.search(body):
                 raise ValueError(f"{path!r}: {odd[0]!r} is no import of names and no export of a declaration")
-            if path != entry:
+            if path != entry:  # which nothing imports: it stays under way
                 body = f"export const {_name(path)} = (() => {{\n{body}return {{ {exported} }};\n}})();"
-                under_way.pop()  # the entry stays: nothing imports it
+                place[path] = own
+                under_way.pop()
             bodies.append(f"// {path}\n{body}")
-            made[path] = name
 
-        for path in roots:
-            if made.get(path, name) != name:
+        for path in roots:  # what is on demand may become more meanwhile
+            if place.get(path, own) != own:
                 raise ValueError(f"the module {path!r} is imported at once and on demand")
-            if path not in made:
+            if path not in place:
                 add(path)
         return "\n".join([*heads.values(), *bodies])
 
     def later(path: str, found: re.Match[str]) -> str:
-        target = _target(path, found[1])
-        if VENDOR in target:
-            return f'import("./{_beside(target, entry)}")'
+        target = posixpath.normpath(f"{path}/../{found[1]}")
+        if "/vendor/" in target:
+            return f'import("./{beside(target)}")'
         on_demand.append(target)
-        return f'import("./{_beside(_LATER, entry)}").then((all) => all.{_name(target)})'
+        return f'import("./{beside(_LATER)}").then((all) => all.{_name(target)})'
 
-    # While the second is made, the list of what is on demand may grow.
     return {_SCRIPT: script(_SCRIPT, [entry]), _LATER: script(_LATER, on_demand)}
-
-
-def _target(path: str, source: str) -> str:
-    return posixpath.normpath(posixpath.join(posixpath.dirname(path), source))
 
 
 def _name(path: str) -> str:
     return "$" + re.sub(r"\W", "_", path)
-
-
-def _beside(path: str, entry: str) -> str:
-    return posixpath.relpath(path, posixpath.dirname(entry))
