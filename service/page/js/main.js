@@ -9,7 +9,7 @@ import { forget, resume, run } from "./network/jobs.js";
 import { loadKinds, loadLaws } from "./scene/kinds.js";
 import { asked, current, listScenes, loadScene, variedParts } from "./scene/scenes.js";
 import { fillSettings, startSettings } from "./scene/settings.js";
-import { contactTable, drawStructure } from "./scene/structure.js";
+import { startStructure } from "./scene/structure.js";
 import { startShape } from "./shape/card.js";
 import { hasOwnView, STUDIES, viewOf, VIEWS } from "./views.js";
 import { startAnswer } from "./views/answer.js";
@@ -26,7 +26,6 @@ import { startRunsTable } from "./workbench/runs_table.js";
 
 const FIRST = "bladed-disk";
 const MOST_NAMES = 20;
-let states = { states: null, at: null };
 let sceneNames = [];
 
 async function scenes() {
@@ -67,20 +66,8 @@ async function open() {
   if (!names.includes(state.contact)) Object.assign(state, { contact: names[0] ?? "", variable: "" });
   fillSettings();
   write();
-  states = { states: null, at: null };
-  drawScene();
   tell("scene");
   for (const view of STUDIES) resume(view.kind, view);
-}
-
-let drawn = "";
-
-// The drawing changes with the scene and the states alone; under a slider that is seldom.
-function drawScene() {
-  const now = JSON.stringify([current.body.name, states.states]);
-  if (now !== drawn) drawStructure(byId("structure-figure"), states.states);
-  drawn = now;
-  show(byId("structure-states"), contactTable(states.states, states.at));
 }
 
 const forgetAll = () => {
@@ -222,15 +209,11 @@ async function start() {
   for (const view of VIEWS) await view.begin();
   read();
   placeCards(VIEWS);
-  for (const begins of [startTabs, startProjects, startRunList, startRuns, startRunsTable, startComparison, startLive]) begins();
+  for (const begins of [startTabs, startProjects, startRunList, startRuns, startRunsTable, startComparison, startStructure, startLive]) begins();
   startViews(VIEWS);
   startShape((at) => ({ ...asked(), frequency_hz: at }));
   for (const begins of [startQuestions, startSettings, startRenewal, startAnswer, startStudy, startFrame]) begins();
   controls();
-  on("states", (found) => {
-    states = found;
-    drawScene();
-  });
   on("sweep-wanted", sweepAlone);
   on("open-run", (found) => openRun(found).catch(failed));
   on("contact", fillSettings);

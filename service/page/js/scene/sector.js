@@ -1,7 +1,8 @@
 // The sector of a disk from finite elements: the outline of its mesh, its boundaries and its contacts, in two views.
 
-import { el, note, show, svg } from "../base/dom.js";
+import { el, note, svg } from "../base/dom.js";
 import { cross, dot, turning, unit } from "../shape/stage.js";
+import { classOf, pattern, plates, stateIn, stateKey, statesOf } from "./marks.js";
 
 const WIDE = 560;
 const HIGH = 330;
@@ -53,18 +54,18 @@ const lines = (edges, places) =>
 const low = ({ x, y }) => svg("circle", { class: "f1", cx: x.toFixed(1), cy: y.toFixed(1), r: DOT });
 const high = ({ x, y }) => svg("rect", { class: "f2", x: (x - DOT).toFixed(1), y: (y - DOT).toFixed(1), width: 2 * DOT, height: 2 * DOT });
 
-// Draws the sector; `look` has what the drawing of a structure says of contacts: {pattern, classOf, wordsOf, stateOf, plates, key}.
-export function drawSector(host, { body: scene, joints }, look) {
+// The drawing, its key and what it leaves out.
+export function drawSector(scene, joints, states) {
   const { outline, sectors, cyclic } = scene.structure;
   const axis = cyclic?.axis ?? [0, 0, 1];
   // Where the next sector has it: turned by the pitch.
   const turn = turning(unit(axis), (2 * Math.PI) / sectors);
   const placed = joints.filter(({ at }) => at);
-  const words = joints.map((joint) => `${joint.name} ${look.wordsOf(joint)}`).join(", ");
+  const words = joints.map((joint) => `${joint.name} ${statesOf(states, joint)}`).join(", ");
   const drawing = svg("svg", {
     role: "img", viewBox: `0 0 ${WIDE} ${HIGH + 18}`,
     "aria-label": `${scene.name}: one of ${sectors} sectors from finite elements, seen along the axis and from the side; ${outline.low.length} nodes on the boundary to the sector before, ${outline.high.length} on that to the next one; ${words || "no contacts"}`,
-  }, look.pattern());
+  }, pattern());
   const next = outline.points.map((p) => turn.map((row) => dot(row, p)));
   views(frameOf(outline.points, axis)).forEach((view, i) => {
     const at = fitted(view, i ? outline.points : [...outline.points, ...next], (i * WIDE) / 2, WIDE / 2);
@@ -73,31 +74,31 @@ export function drawSector(host, { body: scene, joints }, look) {
     drawing.append(svg("path", { class: "mesh", d: lines(outline.edges, places) }));
     if (!outline.edges.length) drawing.append(...places.map(({ x, y }) => svg("circle", { class: "mesh-node", cx: x.toFixed(1), cy: y.toFixed(1), r: 1 })));
     drawing.append(...outline.low.map((k) => low(places[k])), ...outline.high.map((k) => high(places[k])));
-    drawing.append(...marks(placed, at, look, i === 1));
+    drawing.append(...marks(placed, at, states, i === 1));
     drawing.append(svg("text", { class: "soft", x: (i + 0.5) * (WIDE / 2), y: HIGH + 10, "text-anchor": "middle" }, view.words));
   });
-  show(host, drawing, legend(look, placed.length > 0), noted(outline, joints, placed));
+  return [drawing, legend(placed.length > 0), noted(outline, joints, placed)];
 }
 
 // Contacts as plates at their places, named in one view.
-function marks(placed, at, look, named) {
+function marks(placed, at, states, named) {
   return placed.flatMap((joint) => {
     const { x, y } = at(joint.at);
     const side = x < 0.75 * WIDE ? -1 : 1;
     const half = PLATE / 1.4;
     const [from, to] = [{ x: x - half, y }, { x: x + half, y }];
     return [
-      look.plates(from, to, PLATE, look.classOf(look.stateOf(joint)), `${joint.name} ${look.wordsOf(joint)}`),
+      plates(from, to, PLATE, classOf(stateIn(states, joint)), `${joint.name} ${statesOf(states, joint)}`),
       named ? svg("text", { class: "halo", x: x + side * (PLATE + 3), y: y + SIDEWAYS, "text-anchor": side < 0 ? "end" : "start" }, joint.name) : null,
     ].filter(Boolean);
   });
 }
 
-function legend(look, rubbing) {
+function legend(rubbing) {
   const entry = (shape, words) => el("li", {}, svg("svg", { width: 16, height: 16, class: "key", "aria-hidden": "true" }, shape), ` ${words}`);
   return el("ul", { class: "legend" },
     entry(low({ x: 8, y: 8 }), "boundary to the sector before"), entry(high({ x: 8, y: 8 }), "boundary to the next one"),
-    entry(svg("path", { class: "mesh next", d: "M1 8H15" }), "the next sector"), rubbing ? look.key() : null);
+    entry(svg("path", { class: "mesh next", d: "M1 8H15" }), "the next sector"), rubbing ? stateKey() : null);
 }
 
 function noted(outline, joints, placed) {

@@ -5,7 +5,7 @@ import { on } from "../base/state.js";
 import { paperColour, saveBlob } from "../base/exports.js";
 import { hertz, measured, number } from "../base/format.js";
 import { previewer } from "../network/previews.js";
-import { STATES } from "../scene/structure.js";
+import { STATES } from "../scene/marks.js";
 import { stage } from "./stage.js";
 
 const PERIOD_MS = 2400;
