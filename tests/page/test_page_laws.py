@@ -139,8 +139,12 @@ def test_a_damper_between_blades_is_drawn_varied_and_designed(page_of: Any) -> N
     assert {"wedge.mass", "wedge.mu", "wedge.kn", "speed"} <= set(variables(page))
     expect(page.locator("#study")).to_be_enabled()
     assert page.input_value("#variable") == "wedge.mass"
-    expect(page.locator("#variable-unit")).to_have_text("kg")
-    page.fill("#slide-wedge-mass >> xpath=../span/input", "0.008")
+    angle = page.locator("#slide-wedge-angle >> xpath=..")
+    expect(angle).to_contain_text("°")
+    expect(angle.locator("input[type=number]")).to_have_value("20.0535")  # 0.35 rad
+    expect(page.locator("#variable-unit")).to_have_text("g")
+    assert (page.input_value("#low"), page.input_value("#high")) == ("0.4", "60")
+    page.fill("#slide-wedge-mass >> xpath=../span/input", "8")
     page.press("#slide-wedge-mass >> xpath=../span/input", "Tab")
     expect(page).to_have_url(re.compile(r"set=wedge\.mass:0\.008"))
     expect(page.locator("#live-status")).to_contain_text("peak")

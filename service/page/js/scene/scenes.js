@@ -2,7 +2,7 @@
 
 import { everyItem, request } from "../network/api.js";
 import { state } from "../base/state.js";
-import { learnUnits } from "../base/format.js";
+import { learnUnits, shownUnit, unitOf } from "../base/format.js";
 
 // What the service tells of it beside its tables: parameters by path, joints, what each study begins with.
 export const current = { body: null, parameters: new Map(), joints: [], studies: new Map() };
@@ -39,6 +39,18 @@ export function ownValue(path) {
 }
 
 export const value = (path) => state.set[path] ?? ownValue(path);
+
+// The unit of a field for a path, with how many of it make one in SI: that of the scene's own value, while it is set too.
+export function fieldUnit(path) {
+  const [known, unit] = [current.parameters.get(path), unitOf(path)];
+  if (unit === "rad") return { name: "°", per: 180 / Math.PI };
+  const { name, perMetre: per } = shownUnit(known?.value || known?.slider?.high || known?.bounds?.[1], unit);
+  return { name, per };
+}
+
+// A number of a field and of the scene, each as the other: without what rounding adds.
+export const inField = (path, number, digits = 12) => Number((number * fieldUnit(path).per).toPrecision(digits));
+export const ofField = (path, number) => Number((number / fieldUnit(path).per).toPrecision(12));
 
 // What the sliders of a part cover: a path, its words, its ends.
 const ranges = (name) =>

@@ -2,8 +2,7 @@
 
 import { state, tell, write } from "../base/state.js";
 import { byId, options, say, show } from "../base/dom.js";
-import { unitOf } from "../base/format.js";
-import { chooseVariable, defaultRange, variable, variables } from "./scenes.js";
+import { chooseVariable, defaultRange, fieldUnit, inField, ofField, variable, variables } from "./scenes.js";
 
 const MOST_HARMONICS = 200;
 const FIELDS = ["low", "high", "harmonics"];
@@ -24,10 +23,10 @@ export function fillSettings() {
   const path = variable();
   show(byId("variable"), options(variables()));
   byId("variable").value = path;
-  byId("variable-unit").textContent = unitOf(path);
+  byId("variable-unit").textContent = fieldUnit(path).name;
   if (!path) say("study-status", "The scene has no contact to design.");
   state.range ??= path ? defaultRange() : null;
-  if (state.range) [byId("low").value, byId("high").value] = state.range.map(String);
+  if (state.range) [byId("low").value, byId("high").value] = state.range.map((end) => String(inField(path, end)));
   byId("harmonics").value = String(state.harmonics);
   complain({});
 }
@@ -60,7 +59,7 @@ export function readSettings() {
   complain(found);
   if (Object.keys(found).length) return false;
   const harmonics = byId("harmonics").valueAsNumber;
-  const range = variable() ? [byId("low").valueAsNumber, byId("high").valueAsNumber] : null;
+  const range = variable() ? ["low", "high"].map((id) => ofField(variable(), byId(id).valueAsNumber)) : null;
   const other = harmonics !== state.harmonics;
   Object.assign(state, { range, harmonics });
   write();

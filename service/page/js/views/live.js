@@ -3,12 +3,12 @@
 import { on, state, tell, write } from "../base/state.js";
 import { chart } from "../charts/chart.js";
 import { button, byId, el, options, show } from "../base/dom.js";
-import { hertz, length, number, quantity, unitOf } from "../base/format.js";
+import { hertz, length, number, quantity } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 import { responseOf, throughPeak } from "../charts/curves.js";
 import { sameValues } from "../scene/inputs.js";
 import { secondsOf, takes } from "../scene/kinds.js";
-import { asked, current, ownValue, sliders as ranges, value, variedParts } from "../scene/scenes.js";
+import { asked, current, fieldUnit, inField, ofField, ownValue, sliders as ranges, value, variedParts } from "../scene/scenes.js";
 
 const STEPS = 400;
 const SLOW_MS = 300;
@@ -187,8 +187,8 @@ function buildSliders() {
     const slide = el("input", { type: "range", id, min: 0, max: STEPS, step: 1, "aria-describedby": "live-status" });
     const box = el("input", { type: "number", step: "any", "aria-label": `${range.text}, number` });
     slide.addEventListener("input", () => put(range, fromStep(range, Number(slide.value)), true));
-    box.addEventListener("change", () => box.value !== "" && Number.isFinite(box.valueAsNumber) && put(range, box.valueAsNumber));
-    const node = el("div", { class: "slider" }, el("label", { for: id, title: range.words }, range.text), el("span", { class: "pair" }, box, el("span", {}, unitOf(range.path))), slide);
+    box.addEventListener("change", () => box.value !== "" && Number.isFinite(box.valueAsNumber) && put(range, ofField(range.path, box.valueAsNumber)));
+    const node = el("div", { class: "slider" }, el("label", { for: id, title: range.words }, range.text), el("span", { class: "pair" }, box, el("span", {}, fieldUnit(range.path).name)), slide);
     return { range, slide, box, node };
   });
   show(byId("sliders"), contactChooser(), sliders.map((each) => each.node), el("div", {}, button("Values of the scene", () => putAll({}))));
@@ -215,7 +215,7 @@ function fillSliders() {
     slide.value = String(toStep(range, now));
     slide.setAttribute("aria-valuetext", quantity(range.path, now));
     node.classList.toggle("changed", range.path in state.set && now !== ownValue(range.path));
-    if (document.activeElement !== box) box.value = String(Number(now.toPrecision(6)));
+    if (document.activeElement !== box) box.value = String(inField(range.path, now, 6));
   }
 }
 
