@@ -57,7 +57,7 @@ log = logging.getLogger("stickslip.service")
 SOLVER_VERSION = version("stickslip")
 
 _LOOK_AGAIN_SECONDS = 2.0
-FIRST_KERNELS = 190
+FIRST_KERNELS = 200
 """About so many are compiled before a worker begins; which ones is found on the way."""
 _LEAST_KERNELS = 5
 """Seen compiled before it is said how long the rest takes."""

@@ -50,6 +50,12 @@ class Site:
         self._process.wait()
         pytest.fail((self._folder / "log").read_text())
 
+    def kill(self) -> None:
+        assert self._process is not None
+        self._process.kill()
+        self._process.wait()
+        self._process = None
+
     def stop(self) -> None:
         if self._process is not None:
             self._process.terminate()

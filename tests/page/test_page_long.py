@@ -93,7 +93,7 @@ def test_matrices_with_what_was_read(browser: Browser, site: Site, tmp_path: Pat
     where.mkdir(parents=True, exist_ok=True)
     with opened(browser, site) as (context, _):
         page = context.new_page()
-        page.goto(site.url)
+        page.goto(f"{site.url}/?scene=bladed-disk")
         page.locator("html[data-ready]").wait_for(state="attached")
         page.click("#scene-menu")
         page.click("#open-matrices")

@@ -1,10 +1,11 @@
-// The page of stickslip: projects, scenes and runs at the left, one scene with its answer and views beside them.
+// The page of stickslip: a first screen; with a scene in the address projects, scenes and runs at the left, the scene with its
+// answer and views beside them.
 
 import { asOneStep, lastWritten, on, read, state, tell, write } from "./base/state.js";
 import { button, byId, dropsOn, el, onFiles, options, show } from "./base/dom.js";
 import { saveToml } from "./base/exports.js";
 import { restoreTab, startFrame, startNotices, startTabs, startTheme, tabOf } from "./workbench/frame.js";
-import { Problem, patiently, post, watchStart } from "./network/api.js";
+import { Problem, patiently, post } from "./network/api.js";
 import { forget, resume, run } from "./network/jobs.js";
 import { loadKinds, loadLaws } from "./scene/kinds.js";
 import { asked, current, listScenes, loadScene, variedParts } from "./scene/scenes.js";
@@ -19,10 +20,12 @@ import { startRenewal, startStudy } from "./views/study.js";
 import { response } from "./views/response.js";
 import { placeCards, startViews } from "./views/view.js";
 import { startComparison } from "./workbench/comparison.js";
+import { askScene, showFirst, startFirst } from "./workbench/first.js";
 import { listProjects, startProjects } from "./workbench/projects.js";
 import { listRuns, startRunList } from "./workbench/run_list.js";
 import { startRuns } from "./workbench/runs.js";
 import { startRunsTable } from "./workbench/runs_table.js";
+import { startStrip } from "./workbench/starting.js";
 
 const FIRST = "bladed-disk";
 const MOST_NAMES = 20;
@@ -30,15 +33,39 @@ let sceneNames = [];
 
 async function scenes() {
   const known = await listScenes();
+  sceneNames = known;
   show(byId("scene"), options(known.map((each) => [each.name, titleOf(each)])));
+  if (isFirst()) return;
   if (!known.some(({ name }) => name === state.scene)) {
     const wanted = state.scene;
     state.scene = known.some(({ name }) => name === FIRST) ? FIRST : known[0].name;
     if (wanted) missing(wanted);
   }
   byId("scene").value = state.scene;
-  sceneNames = known;
   sceneList();
+}
+
+// Which of the two screens is seen; theme and API are said in the rail of the one, in the bar of the other.
+const isFirst = () => document.documentElement.dataset.screen === "first";
+
+function screen(name) {
+  document.documentElement.dataset.screen = name;
+  byId(name === "first" ? "bar" : "rail").append(byId("foot"));
+}
+
+const first = () => showFirst(sceneNames);
+
+// A link of the page is followed within it, in another tab or window as any.
+function follow(event, act) {
+  if (event.ctrlKey || event.metaKey || event.shiftKey) return;
+  event.preventDefault();
+  act();
+}
+
+function goTo(address) {
+  if (address === location.pathname + location.search) return;
+  history.pushState(null, "", address);
+  asOneStep(restore, { back: true }).catch(failed);
 }
 
 const titleOf = ({ name, shipped }) => (shipped ? name : `${name} (stored)`);
@@ -55,12 +82,12 @@ function sceneList() {
 
 async function choose(name) {
   if (name === state.scene) return;
-  byId("scene").value = name;
   await change(name);
   byId("scene-list").querySelector("[aria-current]")?.focus();
 }
 
 async function open() {
+  screen("scene");
   await loadScene(state.scene);
   const names = variedParts();
   if (!names.includes(state.contact)) Object.assign(state, { contact: names[0] ?? "", variable: "" });
@@ -75,6 +102,8 @@ const forgetAll = () => {
 };
 
 const change = (name) => asOneStep(async () => {
+  screen("scene");
+  byId("scene").value = name;
   forgetAll();
   Object.assign(state, { scene: name, set: {}, contact: "", variable: "", range: null, at: null, jobs: {} });
   tell("scene-left");
@@ -91,8 +120,14 @@ async function restore() {
   read();
   restoreTab();
   if (before === now) return;
-  byId("scene").value = state.scene;
   tell("scene-left");
+  if (!state.scene && !location.search) {
+    screen("first");
+    await scenes();
+    return first();
+  }
+  state.scene ||= FIRST;
+  byId("scene").value = state.scene;
   sceneList();
   await open();
   tell("values");
@@ -117,10 +152,7 @@ const openRun = (run) => asOneStep(() => openedRun(run));
 
 async function openedRun({ id, kind, request }) {
   const scene = typeof request.scene === "string" ? request.scene : await storedAs(request.scene);
-  if (scene !== state.scene) {
-    byId("scene").value = scene;
-    await change(scene);
-  }
+  if (scene !== state.scene) await change(scene);
   Object.assign(state, { set: { ...request.set }, harmonics: request.harmonics ?? state.harmonics });
   const [[path, range] = [], ...more] = Object.entries(request.variables ?? {});
   const varied = path ?? (request.from === undefined ? "" : request.parameter);
@@ -158,18 +190,30 @@ function controls() {
     "new-scene": () => editor().then(({ newScene }) => newScene()).catch(failed), "edit-scene": () => editor().then(({ editCurrent }) => editCurrent()).catch(failed), "save-toml": () => saveToml(`${state.scene}.toml`), share,
   };
   for (const [id, act] of Object.entries(clicks)) byId(id).addEventListener("click", act);
+  byId("home").addEventListener("click", (event) => follow(event, () => goTo(location.pathname)));
+  startFirst({
+    follow, scene: change, newScene: clicks["new-scene"], matrices: clicks["open-matrices"], runs: () => goTo("?tab=runs"),
+    text: (...words) => editor().then(({ openText }) => openText(words[0], "toml", words[1])).catch(failed),
+    rig: (name, files) => change(name).then(() => openRig(files)),
+  });
   byId("scene").addEventListener("change", () => change(byId("scene").value));
   onFiles(byId("file"), (given) => take(given).catch(failed));
   dropsOn(document.body, (given) => given.then(take).catch(failed));
   addEventListener("popstate", () => asOneStep(restore, { back: true }).catch(failed));
 }
 
-// Files that were chosen or dropped: a scene is opened, anything else is taken for matrices.
+function openRig(files) {
+  tell("tab", tabOf("identify"));
+  tell("rig-files", files);
+}
+
+// Files that were chosen or dropped: a scene is opened, tables are what a rig measured, anything else is taken for matrices.
 async function take(files) {
+  if (files.length && files.every(({ name }) => /\.(csv|tsv|txt)$/i.test(name))) return isFirst() ? askScene(files) : openRig(files);
   const { openScene, sceneIn } = await sceneFiles();
   const scene = sceneIn(files);
-  if (scene) await openScene(scene, files);
-  else if (files.length) (await matrices()).openMatrices(files);
+  if (scene) return openScene(scene, files);
+  return files.length ? (await matrices()).openMatrices(files) : undefined;
 }
 
 async function share() {
@@ -189,11 +233,14 @@ function failed(error) {
 }
 
 async function begin() {
-  state.scene ||= FIRST;
-  wishFirst();
+  screen(state.scene || location.search ? "scene" : "first");
+  if (!isFirst()) {
+    state.scene ||= FIRST;
+    wishFirst();
+  }
   try {
     await Promise.all([loadLaws, loadKinds, scenes].map(patiently));
-    await patiently(open);
+    await patiently(isFirst() ? first : open);
     await Promise.all([listProjects(), listRuns()]);
   } catch (error) {
     failed(error);
@@ -205,7 +252,7 @@ async function begin() {
 async function start() {
   startTheme();
   startNotices();
-  watchStart();
+  startStrip();
   for (const view of VIEWS) await view.begin();
   read();
   placeCards(VIEWS);
@@ -219,7 +266,6 @@ async function start() {
   on("contact", fillSettings);
   on("scene-stored", async (name) => {
     await scenes().catch(failed);
-    byId("scene").value = name;
     await change(name);
     byId("study").focus();
   });

@@ -32,6 +32,9 @@ export function redrawn(host, ...children) {
   if (focused) host.querySelector(`[data-focus="${focused}"]`)?.focus();
 }
 
+// Gives the focus back to what was pressed, or where that is folded away to the content.
+export const refocus = (id) => (byId(id).checkVisibility() ? byId(id) : byId("main")).focus();
+
 export function say(id, text, bad = false) {
   const node = byId(id);
   if (node.textContent !== text) node.textContent = text;

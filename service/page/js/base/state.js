@@ -41,7 +41,7 @@ export const lastWritten = () => written;
 
 // A further entry of the browser's history, which what follows writes to: Back leads to what was seen before.
 export function step() {
-  if (!held && state.scene) history.pushState(null, "", location.href);
+  if (!held && (state.scene || !location.search)) history.pushState(null, "", location.href);
 }
 
 // What is done within is one step, or none where it goes back itself.

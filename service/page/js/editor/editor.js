@@ -1,7 +1,7 @@
 // The editor of a scene: tables of its parts and its text side by side, what is wrong at the field and at the line; a scene
 // from nothing: the cases that the service knows, with the few questions of each.
 
-import { button, byId, el, note, onSubmit, say, show } from "../base/dom.js";
+import { button, byId, el, note, onSubmit, refocus, say, show } from "../base/dom.js";
 import { saveText } from "../base/exports.js";
 import { tell } from "../base/state.js";
 import { fieldsOf } from "../forms/fields.js";
@@ -18,8 +18,8 @@ let doc = null;
 let pane = null;
 let back = "edit-scene";
 
-export async function openText(text, form) {
-  if (form === "toml") return begin({ text });
+export async function openText(text, form, from) {
+  if (form === "toml") return begin({ text }, from);
   try {
     return await begin({ scene: (await post("/v1/scenes/read", { text, form })).scene });
   } catch (error) {
@@ -60,7 +60,7 @@ async function begin(given, from = "edit-scene") {
 
 function close() {
   byId("editor").hidden = true;
-  byId(back).focus();
+  refocus(back);
 }
 
 async function build() {

@@ -3,6 +3,7 @@
 
 import { button, byId, details, dropsOn, el, note, onFiles, onSubmit, options, scrolled, show, table } from "../base/dom.js";
 import { number, valuesSaid } from "../base/format.js";
+import { on } from "../base/state.js";
 import { patiently, post, Problem } from "../network/api.js";
 import { asked } from "../scene/scenes.js";
 
@@ -25,6 +26,7 @@ export function startData(onChange) {
   changed = onChange;
   onFiles(byId("identify-file"), takeFiles);
   dropsOn(byId("identify-data"), (given) => given.then(takeFiles));
+  on("rig-files", takeFiles);
 }
 
 async function paste() {

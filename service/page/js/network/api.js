@@ -98,24 +98,15 @@ export function lost() {
   back = (async () => {
     for (let turn = 0; offline; turn += 1) {
       await pause(BACKOFF[Math.min(turn, BACKOFF.length - 1)]);
-      offline = !(await health().then(({ ok }) => ok, () => false));
+      offline = (await partsOfService()) === null;
     }
     tell("online");
   })();
   return back;
 }
 
-const health = () => fetch("/health/ready", { cache: "no-store" });
-
-// Tells what the service still starts, in its own words, until all is there.
-export async function watchStart() {
-  for (let told = null; ; await pause(2)) {
-    const { starting = null } = await health().then((answer) => answer.json(), () => ({ starting: told }));
-    if (starting !== told) tell("starting", starting);
-    if (!starting) return;
-    told = starting;
-  }
-}
+// How far each part of the service is started; null where no service answers.
+export const partsOfService = () => fetch("/health/ready", { cache: "no-store" }).then((answer) => answer.json()).then(({ parts }) => parts, () => null);
 
 // Waits until the service answers again, then tries once more; for reads and for what has an idempotency key.
 export async function patiently(attempt) {

@@ -1,7 +1,7 @@
 // Matrices of a finite-element program become a scene: files in, what was read, what is needed, the editor.
 
 import { Problem, post, request } from "../network/api.js";
-import { button, byId, details, el, facts, onFiles, onSubmit, say, show } from "../base/dom.js";
+import { button, byId, details, el, facts, onFiles, onSubmit, refocus, say, show } from "../base/dom.js";
 import { edit } from "../editor/editor.js";
 import { on } from "../base/state.js";
 import { hertz, measured, number } from "../base/format.js";
@@ -30,7 +30,7 @@ on("scene-stored", (name) => {
 
 function close() {
   byId("matrices").hidden = true;
-  byId("open-matrices").focus();
+  refocus("open-matrices");
 }
 
 // What can be read, as the service says.

@@ -178,8 +178,6 @@ function silent() {
 export function startNotices() {
   on("offline", () => told("The service does not answer. Nothing is lost: this page goes on when it is back.", true));
   on("online", silent);
-  // While the service starts the banner says what; what goes on then is not for it to hide.
-  on("starting", (text) => told(text ?? "", true));
   on("notice", (text) => told([text, " ", button("Close", silent)]));
   on("key-wanted", (problem) => {
     byId("key-form").hidden = false;

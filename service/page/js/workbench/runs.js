@@ -64,7 +64,7 @@ function draw() {
   // The same list is not drawn anew under the focus or a press; only how far things are goes on.
   if (now === seen) return busy.forEach(progressed);
   seen = now;
-  return redrawn(byId("runs-list"), shown.map(line));
+  return redrawn(byId("runs-list"), shown.map(runLine));
 }
 
 function progressed(run) {
@@ -74,7 +74,7 @@ function progressed(run) {
   node.querySelector(".run-time").textContent = `${WORDS[run.status]}${timing(run)}`;
 }
 
-function line(run) {
+export function runLine(run) {
   const title = titleOf(run);
   const open = state.jobs[run.kind] === run.id;
   const words = [peakOf(run), ...valuesOf(run, 1), wordOf(run) ?? ""].filter(Boolean).join(" · ");
