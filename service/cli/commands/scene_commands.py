@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from enum import Enum
 from typing import Annotated, Any
 
@@ -13,6 +14,7 @@ from service.cli.options import parameters as options
 from service.errors import InputError
 from service.rendering.text import print_json, print_table, say
 from solver.results import units
+from solver.results.told import UNIT
 from solver.scene.json_schema import DIALECT, plain, scene_schema
 from solver.wording import nearest
 
@@ -28,8 +30,42 @@ class Described(Enum):
 def schema_of(what: Described) -> dict[str, Any]:
     """The schema of one kind of file."""
     if what is Described.SCENE:
-        return scene_schema()
+        found: dict[str, Any] = _with_units(scene_schema())
+        return found
     return _problem() if what is Described.PROBLEM else _job()
+
+
+_LIMITS = ("type", "minimum", "exclusiveMinimum", "maximum", "exclusiveMaximum")
+
+
+def _text_in(unit: str) -> dict[str, Any]:
+    """A number with a unit behind it that may stand for another."""
+    names = {unit, *units.SUFFIXES.get(unit, {})}
+    names |= {spelled for spelled, name in units.SPELLED.items() if name in names}
+    said = "|".join(re.escape(name).replace("\\ ", " ?") for name in sorted(names))
+    return {"type": "string", "pattern": rf"^\s*[-+]?[0-9.]+([eE][-+]?[0-9]+)?\s*({said})\s*$"}
+
+
+def _with_units(schema: Any, unit: str = "") -> Any:
+    """Of a scene in a file, where a number that has a unit may be a text with one, ``"35 deg"``."""
+    if isinstance(schema, list):
+        return [_with_units(one, unit) for one in schema]
+    if not isinstance(schema, dict):
+        return schema
+    words = schema.get("description")
+    if isinstance(words, str):
+        unit = next((each for each in UNIT.findall(words) if "," not in each), "")
+    # What stands below a name is described by itself.
+    kept = {
+        key: {name: _with_units(one) for name, one in value.items()}
+        if key in ("properties", "patternProperties", "$defs")
+        else _with_units(value, unit)
+        for key, value in schema.items()
+    }
+    if not unit or kept.get("type") != "number":
+        return kept
+    number = {key: kept.pop(key) for key in _LIMITS if key in kept}
+    return {**kept, "anyOf": [number, _text_in(unit)]}
 
 
 def _problem() -> dict[str, Any]:

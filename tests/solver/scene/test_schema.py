@@ -44,6 +44,17 @@ def test_shipped_scenes_pass(name: str) -> None:
     assert list(SCENE.iter_errors(load_raw(name))) == []
 
 
+def test_numbers_may_have_a_unit() -> None:
+    raw = copy.deepcopy(load_raw("platform-wedge"))
+    wedge = raw["dampers"][0]  # type: ignore[index]
+    wedge.update(angle="20.05 deg", kt="20 N/µm", mass="4 g")
+    raw["observe"].update(band=["0.3 kHz", 420.0])  # type: ignore[attr-defined]
+    assert [error.message for error in SCENE.iter_errors(raw)] == []
+    assert solver.Scene.from_dict(raw).dampers[0].mass == pytest.approx(0.004)
+    wedge.update(mass="4 mm")
+    assert [error.json_path for error in SCENE.iter_errors(raw)]
+
+
 @pytest.mark.parametrize("block", [b for b in BLOCKS if {"structure", "excitation"} <= set(b)])
 def test_the_scenes_of_the_pages_pass(block: dict[str, Any]) -> None:
     assert [error.message for error in SCENE.iter_errors(block)] == []
