@@ -154,4 +154,4 @@ def test_a_damper_between_blades_is_drawn_varied_and_designed(page_of: Any) -> N
     page.route("**/v1/previews", lambda _: None)
     page.get_by_role("button", name="two-dof", exact=True).click()
     expect(page.locator("#slide-damper-N0")).to_be_visible()
-    expect(page.locator("#live-figure")).to_contain_text("Nothing computed yet")
+    expect(page.locator("#live-figure")).to_contain_text("The response is on its way.")

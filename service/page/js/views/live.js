@@ -11,6 +11,7 @@ import { secondsOf, takes } from "../scene/kinds.js";
 import { asked, current, fieldUnit, inField, ofField, ownValue, sliders as ranges, value, variedParts } from "../scene/scenes.js";
 
 const STEPS = 400;
+const COMES = "The response is on its way.";
 const SLOW_MS = 300;
 const ROOM = 1.3; // above the response, where its limits rise
 let plot = null;
@@ -28,6 +29,7 @@ let study = null;
 
 export function startLive() {
   plot = chart(byId("live-figure"), { label: "Frequency response", file: "response", height: 260, onPick: ({ x }) => tell("point", x) });
+  plot.clear(COMES);
   ask = previewer("sweep", drawn, refused);
   show(byId("pins"), button("Pin this curve", pin, { id: "pin" }), button("Unpin all", unpin, { id: "unpin", hidden: true }));
   on("study-curve", (found) => {
@@ -37,7 +39,7 @@ export function startLive() {
   // The curve of another scene is not shown under the name of this one, whether its own comes or not.
   on("scene-left", () => {
     [latest, study, took] = [null, null, 0];
-    plot.clear();
+    plot.clear(COMES);
   });
   on("scene", () => {
     latest = null;
@@ -63,7 +65,10 @@ export function wishFirst() {
 
 function sayLate() {
   clearTimeout(slow);
-  slow = setTimeout(() => { byId("live-status").textContent = `The response is being computed${takes("sweep") && `, ${takes("sweep")}`} …`; }, SLOW_MS);
+  slow = setTimeout(() => {
+    const long = byId("starting").hidden ? takes("sweep") : "slowly until all is ready";
+    byId("live-status").textContent = `The response is being computed${long && `, ${long}`} …`;
+  }, SLOW_MS);
 }
 
 function refresh() {
@@ -80,6 +85,7 @@ function refused(error, token) {
   clearTimeout(slow);
   early = null;
   if (token.scene !== state.scene) return;
+  if (!shown()) plot.clear();
   if (error.retryAfter || error.status === 409) {
     byId("live-status").textContent = error.message;
     return;

@@ -12,6 +12,7 @@ import { presses, runLine } from "./runs.js";
 const MOST_RUNS = 4;
 const MOST_SCENES = 5;
 const MATRIX = 66;
+const EDGE = 4;
 let acts = null;
 let known = [];
 let templates = null;
@@ -66,10 +67,14 @@ function tables(name) {
   return scenes.get(name);
 }
 
-// Place for the drawing of a scene, which is drawn when it is known.
+// Place for the drawing of a scene, which fills it when it is known.
 function picture(scene) {
   const host = el("span", { class: "picture", "aria-hidden": "true" });
-  orNotice(async () => drawScene(host, await scene, { small: true }));
+  orNotice(async () => {
+    drawScene(host, await scene, { small: true });
+    const { x, y, width, height } = host.firstChild.getBBox();
+    if (width) host.firstChild.setAttribute("viewBox", `${x - EDGE} ${y - EDGE} ${width + 2 * EDGE} ${height + 2 * EDGE}`);
+  });
   return host;
 }
 
