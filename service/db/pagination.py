@@ -47,13 +47,9 @@ def plain_conditions(
 
 
 def owner_condition(
-    connection: Connection,
-    identity: InstrumentedAttribute[Any],
-    column: InstrumentedAttribute[str],
-    owner: str | None,
-    *,
-    leads: bool,
-) -> list[Condition]:
+    connection: Connection, identity: InstrumentedAttribute[Any], column: InstrumentedAttribute[str],
+    owner: str | None, *, leads: bool,
+) -> list[Condition]:  # fmt: skip
     """The condition that rows are an owner's; none for everybody's (None).
 
     `leads` says whether nothing else names an index: the one of the owner, in the order of the ids, is then
@@ -152,12 +148,9 @@ def within(column: InstrumentedAttribute[Any], bounds: Range) -> list[ColumnElem
 
 
 def ordered(
-    query: Select[Any],
-    keys: Sequence[InstrumentedAttribute[Any]],
-    *,
-    descending: bool,
+    query: Select[Any], keys: Sequence[InstrumentedAttribute[Any]], *, descending: bool,
     after: Sequence[Any] | None,
-) -> Select[Any]:
+) -> Select[Any]:  # fmt: skip
     """Order by columns, the last of which tells all rows apart, and go on behind their values `after`."""
     query = query.order_by(*(key.desc() if descending else key.asc() for key in keys))
     if after is None:

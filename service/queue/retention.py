@@ -81,14 +81,9 @@ class _Paced:
 
 
 def prune(
-    database: Database,
-    before: datetime,
-    *,
-    keep_designs: bool,
-    binned: bool = False,
-    pause: Callable[[float], bool] | None = None,
-    on_progress: Callable[[Pruned], None] | None = None,
-) -> Pruned:
+    database: Database, before: datetime, *, keep_designs: bool, binned: bool = False,
+    pause: Callable[[float], bool] | None = None, on_progress: Callable[[Pruned], None] | None = None,
+) -> Pruned:  # fmt: skip
     """Delete the jobs that ended before a time, with their results and sweeps.
 
     Parameters
@@ -115,12 +110,9 @@ def prune(
 
 
 def empty_bin(
-    database: Database,
-    before: datetime,
-    *,
-    pause: Callable[[float], bool] | None = None,
+    database: Database, before: datetime, *, pause: Callable[[float], bool] | None = None,
     on_progress: Callable[[Pruned], None] | None = None,
-) -> Pruned:
+) -> Pruned:  # fmt: skip
     """Delete the runs and projects that were put in the bin before a time; arguments as of `prune`."""
     found = prune(
         database, before, keep_designs=False, binned=True, pause=pause, on_progress=on_progress
@@ -217,15 +209,9 @@ class Retention:
 
 
 def prune_database(
-    url: str,
-    seconds: float,
-    *,
-    keep_designs: bool,
-    uploads: bool = False,
-    dry_run: bool = False,
-    vacuum: bool = False,
-    arrays: str | None = None,
-) -> Pruned:
+    url: str, seconds: float, *, keep_designs: bool, uploads: bool = False, dry_run: bool = False,
+    vacuum: bool = False, arrays: str | None = None,
+) -> Pruned:  # fmt: skip
     """Delete the jobs that ended longer ago than `seconds`, and uploads as old, or count them.
 
     What was put in the bin longer ago goes with them, designs too. DatabaseInUseError if an SQLite file is in

@@ -65,14 +65,9 @@ STATUS: dict[type[errors.ServiceError], tuple[int, str, str]] = {
 
 
 def problem(
-    request: Request,
-    status: int,
-    slug: str,
-    title: str,
-    detail: str,
-    issues: list[dict[str, str]] | None = None,
-    headers: Mapping[str, str] | None = None,
-) -> JSONResponse:
+    request: Request, status: int, slug: str, title: str, detail: str,
+    issues: list[dict[str, str]] | None = None, headers: Mapping[str, str] | None = None,
+) -> JSONResponse:  # fmt: skip
     """A problem document about a request."""
     body: dict[str, Any] = {
         "type": f"urn:stickslip:problem:{slug}", "title": title, "status": status, "detail": detail,

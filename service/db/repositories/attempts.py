@@ -220,14 +220,9 @@ def change(connection: Connection, condition: ColumnElement[bool], **values: Any
 
 
 def recover(
-    connection: Connection,
-    condition: ColumnElement[bool],
-    reason: str,
-    now: datetime,
-    parameters: Mapping[str, Any] | None = None,
-    *,
-    skip_locked: bool = False,
-) -> RecoveredJobs:
+    connection: Connection, condition: ColumnElement[bool], reason: str, now: datetime,
+    parameters: Mapping[str, Any] | None = None, *, skip_locked: bool = False,
+) -> RecoveredJobs:  # fmt: skip
     """Running jobs without an owner: dismissed if asked for, failed after the last attempt, else waiting.
 
     PostgreSQL locks the rows as it reads them, so that nobody changes them before they are written.

@@ -341,12 +341,9 @@ def _read_quantities(connection: Connection, of: str, wanted: Iterable[Name]) ->
 
 
 def insert_results(
-    connection: Connection,
-    job_id: str,
-    records: Iterable[StoredRecord],
-    created: datetime,
+    connection: Connection, job_id: str, records: Iterable[StoredRecord], created: datetime,
     owner: str = NOBODY,
-) -> None:
+) -> None:  # fmt: skip
     """Write results of a job inside the transaction that writes its own; `owner` is the job's."""
     figures, arrays = [], []
     for position, record in enumerate(records):
