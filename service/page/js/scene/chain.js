@@ -2,6 +2,7 @@
 
 import { svg } from "../base/dom.js";
 import { measured } from "../base/format.js";
+import { labels } from "./labels.js";
 import { classOf, ownName, pattern, plates, stateIn, statesOf, wordsOf } from "./marks.js";
 
 const GROUND = "ground";
@@ -9,13 +10,13 @@ const MOST_SECTORS = 24;
 const SHOWN_OF_MANY = 3;
 const HEIGHT = 250;
 
-export function drawChain(scene, joints, states, width) {
+export function drawChain(scene, joints, { states, value = () => undefined, width }) {
   const parts = partsOf(scene, joints);
   const names = parts.contacts.map((c) => `${c.name} ${statesOf(states, c)}`).join(", ");
   const label = `${scene.name}: ${parts.cyclic ? `${parts.sectors} sectors of ` : ""}${parts.dofs.length} masses, ${parts.springs.length} springs; ${names || "no contacts"}`;
   const drawing = svg("svg", { role: "img", "aria-label": label }, pattern());
-  if (parts.cyclic) disk(drawing, scene, parts, states);
-  else lumped(drawing, scene, parts, states, width);
+  if (parts.cyclic) disk(drawing, scene, parts, { states, width });
+  else lumped(drawing, scene, parts, { states, value, width });
   return drawing;
 }
 
@@ -37,11 +38,10 @@ function zigzag(a, b, size) {
 const spring = (a, b, size, title) =>
   svg("path", { class: "spring", d: zigzag(a, b, size) }, title ? svg("title", {}, title) : null);
 
-function mass(place, size, name, observed, text) {
+function mass(place, size, name, observed) {
   return [
     svg("circle", { class: observed ? "mass observed" : "mass", cx: place.x, cy: place.y, r: size }, svg("title", {}, name)),
-    observed ? svg("circle", { class: "mass", cx: place.x, cy: place.y, r: Math.max(size - 4, 1.5) }) : null,
-    text ? svg("text", { class: "halo", x: place.x, y: place.y + text.dy, "text-anchor": "middle" }, name) : null,
+    ...(observed ? [svg("circle", { class: "mass", cx: place.x, cy: place.y, r: Math.max(size - 4, 1.5) })] : []),
   ];
 }
 
@@ -51,7 +51,6 @@ function arrow(place, size) {
   return [
     svg("path", { class: "force", d: `M${x} ${top - 26}V${top - 6}` }),
     svg("path", { class: "force", d: `M${x - 4} ${top - 8}H${x + 4}L${x} ${top}Z` }),
-    svg("text", { class: "halo", x: x - 8, y: top - 15, "text-anchor": "end" }, "force"),
   ];
 }
 
@@ -76,7 +75,8 @@ const forcesOf = (scene) =>
   (Array.isArray(scene.excitation) ? scene.excitation : [scene.excitation]).flatMap((force) =>
     force.dof ? [force] : Object.keys(force.forces ?? force.driven ?? {}).map((dof) => ({ ...force, dof })));
 
-function lumped(drawing, scene, parts, states, width) {
+function lumped(drawing, scene, parts, { states, value, width }) {
+  const words = labels({ width, height: HEIGHT });
   const { places, size, ground } = chain(parts, width, HEIGHT);
   drawing.setAttribute("viewBox", `0 0 ${width} ${HEIGHT}`);
   const end = (name, other, count) =>
@@ -90,20 +90,31 @@ function lumped(drawing, scene, parts, states, width) {
     if (a && b) drawing.append(spring(a, b, 6, `${s.name ?? "spring"}: ${measured(s.k, "N/m")}`));
   });
   const held = new Map();
+  const told = [];
+  const label = (...more) => told.push(more);
   for (const contact of parts.contacts) {
-    drawing.append(...lumpedContact(contact, { places, size, width, held }, classOf(stateIn(states, contact)), `${contact.name} ${statesOf(states, contact)}`));
+    drawing.append(...lumpedContact(contact, { places, size, width, held, words, label }, classOf(stateIn(states, contact)), `${contact.name} ${statesOf(states, contact)}`));
   }
   for (const dof of parts.dofs) {
-    drawing.append(...mass(places.get(dof), size, dof, dof === ownName(scene.observe.dof), { dy: 4 }).filter(Boolean));
+    const place = places.get(dof);
+    drawing.append(...mass(place, size, dof, dof === ownName(scene.observe.dof)));
+    drawing.append(words.put(dof, place, { far: size + 3, sides: [[0, 0], [0, 1], [0, -1], [1, 0], [-1, 0]] }) ?? "");
+    words.keep(place, size);
   }
-  for (const force of forcesOf(scene)) {
-    const place = places.get(ownName(force.dof));
-    if (place) drawing.append(...arrow(place, size));
+  const forces = forcesOf(scene);
+  for (const { dof, amplitude } of forces) {
+    const place = places.get(ownName(dof));
+    if (!place) continue;
+    drawing.append(...arrow(place, size));
+    words.keep({ x: place.x, y: place.y - size - 16 }, 12);
+    const force = forces.length === 1 ? value("excitation.amplitude") ?? amplitude : amplitude;
+    label(typeof force === "number" ? measured(force, "N", null, 3) : "force", { x: place.x, y: place.y - size - 18 }, { far: 8, class: "halo green", bold: true, sides: [[-1, 0], [1, 0], [0, -1]] });
   }
+  drawing.append(...told.map((each) => words.put(...each) ?? ""));
 }
 
 // A contact to the ground hangs below its mass, one between masses is drawn above them; `held` counts those there.
-function lumpedContact({ between }, { places, size, width, held }, state, words) {
+function lumpedContact({ between }, { places, size, width, held, words, label }, state, said) {
   const free = ownName(between.find((name) => name !== GROUND));
   const grounded = between.includes(GROUND);
   const [a, b] = [places.get(free), places.get(ownName(between[grounded ? 0 : 1])) ?? places.get(free)];
@@ -114,34 +125,34 @@ function lumpedContact({ between }, { places, size, width, held }, state, words)
   if (grounded) {
     const x = a.x + 48 * before;
     const [top, bottom] = [a.y + size, HEIGHT - 42];
-    const left = x > width / 2 && before === 0;
+    const left = x > width / 2 ? -1 : 1;
+    words.keep({ x, y: (top + bottom) / 2 }, 14);
+    label(said, { x, y: (top + bottom) / 2 }, { far: 18, sides: [[left, 0], [-left, 0], [-left, 0.8], [left, 0.8], [0, 1]] });
     return [
       before ? svg("path", { class: "earth", d: `M${a.x} ${a.y + size + 4}H${x}` }) : null,
-      plates({ x, y: top }, { x, y: bottom }, 20, state, words),
+      plates({ x, y: top }, { x, y: bottom }, 20, state, said),
       hatched(x, bottom, 18),
-      before
-        ? svg("text", { class: "halo", x: Math.min(x + 40, width - 4), y: bottom + 22 + 15 * (before - 1), "text-anchor": "end" }, words)
-        : svg("text", { class: "halo", x: x + (left ? -18 : 18), y: (top + bottom) / 2 + 4, "text-anchor": left ? "end" : "start" }, words),
     ].filter(Boolean);
   }
   const side = a.x < b.x ? 10 : -10;
   const y = Math.max(Math.min(a.y, b.y) - size - 20 - 34 * before, 24);
   const [p, q] = [{ x: a.x + side, y }, { x: b.x - side, y }];
-  return [
-    svg("path", { class: "earth", d: `M${p.x} ${a.y}V${y}M${q.x} ${b.y}V${y}` }),
-    plates(p, q, 20, state, words),
-    svg("text", { class: "halo", x: (p.x + q.x) / 2, y: y - 16, "text-anchor": "middle" }, words),
-  ];
+  words.keep({ x: (p.x + q.x) / 2, y }, 12);
+  label(said, { x: (p.x + q.x) / 2, y }, { far: 14, sides: [[0, -1], [0, 1], [-1, 0], [1, 0]] });
+  return [svg("path", { class: "earth", d: `M${p.x} ${a.y}V${y}M${q.x} ${b.y}V${y}` }), plates(p, q, 20, state, said)];
 }
 
-function disk(drawing, scene, parts, states) {
-  const radius = 190;
-  const { place, hub, shown, closed, size } = ring(parts, radius);
+function disk(drawing, scene, parts, { states, width }) {
   const pad = 34;
+  const side = parts.sectors > MOST_SECTORS ? pad + 40 : pad;
+  const radius = Math.min(190, width / 2 - side);
+  const { place, hub, shown, closed, size } = ring(parts, radius);
   const depth = closed ? 2 * (radius + pad) : radius + 2 * pad + 26;
-  drawing.setAttribute("viewBox", `${-radius - pad - 40} ${-radius - pad} ${2 * (radius + pad + 40)} ${depth}`);
-  drawing.append(svg("circle", { class: "earth", r: radius * 0.12, "stroke-dasharray": "3 3" }), svg("text", { class: "soft", y: 4, "text-anchor": "middle" }, "hub"));
-  if (!closed) drawing.append(svg("text", { class: "soft", y: radius * 0.12 + 16, "text-anchor": "middle" }, `${shown} of ${parts.sectors} sectors`));
+  const frame = { left: -radius - side, top: -radius - pad, width: 2 * (radius + side), height: depth };
+  const words = labels(frame);
+  drawing.setAttribute("viewBox", Object.values(frame).join(" "));
+  drawing.append(svg("circle", { class: "earth", r: radius * 0.12, "stroke-dasharray": "3 3" }), words.put("hub", { x: 0, y: 0 }, { far: 0, class: "soft", sides: [[0, 0]] }));
+  if (!closed) drawing.append(words.put(`${shown} of ${parts.sectors} sectors`, { x: 0, y: radius * 0.12 + 6 }, { class: "soft", far: 2, sides: [[0, 1]] }));
   const end = (name, j) => {
     const next = name.endsWith("@next") ? 1 : 0;
     return name === GROUND ? hub(j) : place(ownName(name), j + next);
@@ -164,17 +175,20 @@ function disk(drawing, scene, parts, states) {
       drawing.append(plates(a, b, Math.max(size * 0.95, 8), classOf(found), words));
     }
   }
+  const named = [];
   const observed = ownName(scene.observe.dof);
   const pushed = forcesOf(scene).map((force) => ownName(force.dof));
   for (const j of sectors) {
     for (const dof of parts.dofs) {
       const here = place(dof, j);
-      drawing.append(...mass(here, size, dof, dof === observed, null).filter(Boolean));
+      drawing.append(...mass(here, size, dof, dof === observed));
+      words.keep(here, size);
       if (pushed.includes(dof)) drawing.append(push(here, size));
       const far = size + (closed && pushed.includes(dof) ? 21 : 5);
-      if (j === 0) drawing.append(svg("text", { class: "halo", x: here.x + (closed ? far : -far), y: here.y + 4, "text-anchor": closed ? "start" : "end" }, dof));
+      if (j === 0) named.push([dof, here, { far, more: 1, sides: closed ? [[1, 0], [0.8, -0.8], [0.8, 0.8], [-1, 0], [0, -1]] : [[-1, 0], [1, 0]] }]);
     }
   }
+  drawing.append(...named.map((each) => words.put(...each) ?? ""));
 }
 
 // A contact between two rings of the same blade is drawn beside the spring there.

@@ -2,16 +2,15 @@
 
 import { el, note, svg } from "../base/dom.js";
 import { cross, dot, turning, unit } from "../shape/stage.js";
+import { labels } from "./labels.js";
 import { classOf, pattern, plates, stateIn, stateKey, statesOf } from "./marks.js";
 
-const WIDE = 560;
 const HIGH = 330;
 const PAD = 26;
 const TURN = (50 * Math.PI) / 180;
 const TILT = (22 * Math.PI) / 180;
 const DOT = 2.6;
 const PLATE = 11;
-const SIDEWAYS = 4;
 const times = (a, k) => a.map((value) => k * value);
 const plus = (a, b) => a.map((value, i) => value + b[i]);
 
@@ -55,7 +54,7 @@ const low = ({ x, y }) => svg("circle", { class: "f1", cx: x.toFixed(1), cy: y.t
 const high = ({ x, y }) => svg("rect", { class: "f2", x: (x - DOT).toFixed(1), y: (y - DOT).toFixed(1), width: 2 * DOT, height: 2 * DOT });
 
 // The drawing, its key and what it leaves out.
-export function drawSector(scene, joints, states) {
+export function drawSector(scene, joints, { states, width }) {
   const { outline, sectors, cyclic } = scene.structure;
   const axis = cyclic?.axis ?? [0, 0, 1];
   // Where the next sector has it: turned by the pitch.
@@ -63,33 +62,34 @@ export function drawSector(scene, joints, states) {
   const placed = joints.filter(({ at }) => at);
   const words = joints.map((joint) => `${joint.name} ${statesOf(states, joint)}`).join(", ");
   const drawing = svg("svg", {
-    role: "img", viewBox: `0 0 ${WIDE} ${HIGH + 18}`,
+    role: "img", viewBox: `0 0 ${width} ${HIGH + 18}`,
     "aria-label": `${scene.name}: one of ${sectors} sectors from finite elements, seen along the axis and from the side; ${outline.low.length} nodes on the boundary to the sector before, ${outline.high.length} on that to the next one; ${words || "no contacts"}`,
   }, pattern());
+  const room = labels({ width, height: HIGH + 18 });
   const next = outline.points.map((p) => turn.map((row) => dot(row, p)));
   views(frameOf(outline.points, axis)).forEach((view, i) => {
-    const at = fitted(view, i ? outline.points : [...outline.points, ...next], (i * WIDE) / 2, WIDE / 2);
+    const at = fitted(view, i ? outline.points : [...outline.points, ...next], (i * width) / 2, width / 2);
     const places = outline.points.map(at);
     if (!i) drawing.append(svg("path", { class: "mesh next", d: lines(outline.edges, next.map(at)) }));
     drawing.append(svg("path", { class: "mesh", d: lines(outline.edges, places) }));
     if (!outline.edges.length) drawing.append(...places.map(({ x, y }) => svg("circle", { class: "mesh-node", cx: x.toFixed(1), cy: y.toFixed(1), r: 1 })));
     drawing.append(...outline.low.map((k) => low(places[k])), ...outline.high.map((k) => high(places[k])));
-    drawing.append(...marks(placed, at, states, i === 1));
-    drawing.append(svg("text", { class: "soft", x: (i + 0.5) * (WIDE / 2), y: HIGH + 10, "text-anchor": "middle" }, view.words));
+    drawing.append(room.put(view.words, { x: (i + 0.5) * (width / 2), y: HIGH }, { class: "soft", far: 0, sides: [[0, 1]] }) ?? "");
+    drawing.append(...marks(placed, at, states, i === 1 && room));
   });
   return [drawing, legend(placed.length > 0), noted(outline, joints, placed)];
 }
 
-// Contacts as plates at their places, named in one view.
-function marks(placed, at, states, named) {
+// Contacts as plates at their places, named where there is room for that.
+function marks(placed, at, states, room) {
+  if (room) for (const joint of placed) room.keep(at(joint.at), PLATE);
   return placed.flatMap((joint) => {
     const { x, y } = at(joint.at);
-    const side = x < 0.75 * WIDE ? -1 : 1;
     const half = PLATE / 1.4;
     const [from, to] = [{ x: x - half, y }, { x: x + half, y }];
     return [
       plates(from, to, PLATE, classOf(stateIn(states, joint)), `${joint.name} ${statesOf(states, joint)}`),
-      named ? svg("text", { class: "halo", x: x + side * (PLATE + 3), y: y + SIDEWAYS, "text-anchor": side < 0 ? "end" : "start" }, joint.name) : null,
+      (room && room.put(joint.name, { x, y }, { far: PLATE + 3 })) || null,
     ].filter(Boolean);
   });
 }

@@ -3,49 +3,85 @@
 import { byId, note, numeric, show, table } from "../base/dom.js";
 import { on } from "../base/state.js";
 import { hertz, number } from "../base/format.js";
+import { previewer } from "../network/previews.js";
+import { drawBodies, hasPlaces, pointOf } from "./bodies.js";
 import { drawChain } from "./chain.js";
-import { legend, statesOf } from "./marks.js";
-import { current, value } from "./scenes.js";
+import { legend, ownName, statesOf } from "./marks.js";
+import { asked, current, value } from "./scenes.js";
 import { drawSector } from "./sector.js";
 
 const WIDEST = 560;
 const NARROWEST = 320;
+const [SMALL, LOW, HIGH] = [180, 230, 256];
 let states = null;
 let at = null;
+let loads = null;
 let drawn = "";
+let ask = null;
+// Loads are asked for once the slider rests.
+const REST_MS = 200;
+let resting = 0;
 
 // The contacts and dampers of a scene of which the service has said nothing yet.
-const jointsOf = ({ contacts = [], dampers = [], nodes = [] }) => {
+function jointsOf(scene) {
+  const { contacts = [], dampers = [], nodes = [] } = scene;
   const dofOf = (end) => {
     const [name, sector] = end.split("@");
     const node = nodes.find((each) => each.name === name);
     return node ? [Object.values(node.dofs)[0], sector].filter(Boolean).join("@") : end;
   };
-  return [...contacts, ...dampers].filter(({ between }) => between).map(({ name, law, shape, between }) => ({ name, law: shape ?? law, between: between.map(dofOf), at: null, contacts: [name] }));
-};
-
-// Draws a scene into `host`: `joints` as the service tells them, `states` of its contacts by name; or `small`, as a
-// picture on a card, without words.
-export function drawScene(host, scene, { joints = jointsOf(scene), states: found = null, small = false } = {}) {
-  const width = small ? NARROWEST : Math.min(Math.max(host.clientWidth, NARROWEST), WIDEST);
-  const parts = scene.structure.outline ? drawSector(scene, joints, found) : [drawChain(scene, joints, found, width), legend()];
-  if (small) for (const words of parts[0].querySelectorAll("text, defs")) words.remove();
-  return show(host, small ? parts[0] : parts);
-}
-
-// The card follows the scene and what its contacts do; under a slider that changes seldom.
-export function startStructure() {
-  on("scene", () => {
-    drawn = "";
-    told({ states: null, at: null });
+  return [...contacts, ...dampers].map((each) => {
+    const { between, at } = { ...each.pairs?.[0], ...each };
+    return { name: each.name, law: each.shape ?? each.law, between: between.map(dofOf), at: pointOf(scene, { at, between }), contacts: [each.name] };
   });
-  on("states", told);
 }
 
-function told(found) {
-  ({ states, at } = found);
-  const now = JSON.stringify([current.body.name, states]);
-  if (now !== drawn) drawScene(byId("structure-figure"), current.body, { joints: current.joints, states });
+// Draws a scene into `host`: `joints` as the service tells them, `states` and mean normal `loads` of its contacts by name,
+// `value` of a path as it is set; or `small`, as a picture on a card, without words.
+export function drawScene(host, scene, { joints = jointsOf(scene), small = false, ...look } = {}) {
+  const width = Math.max(small ? 0 : host.clientWidth, NARROWEST);
+  const drawing = scene.structure.outline ? drawSector(scene, joints, { ...look, width: Math.min(width, WIDEST) })
+    : hasPlaces(scene, joints) ? drawBodies(scene, joints, { ...look, small, width, height: small ? SMALL : width > WIDEST ? HIGH : LOW })
+      : [drawChain(scene, joints, { ...look, width: Math.min(width, WIDEST) }), legend(), note("No [[nodes]]: not to scale.")];
+  if (small) for (const words of drawing[0].querySelectorAll("text, defs")) words.remove();
+  return show(host, small ? drawing[0] : drawing);
+}
+
+// The card follows the scene, its values and what its contacts do.
+export function startStructure() {
+  ask = previewer("loads", ({ converged, period }, { token }) => {
+    if (token !== wish() || !converged) return;
+    loads = { of: token, by: loadsOf(period) };
+    draw();
+  }, () => undefined);
+  on("scene", () => {
+    [states, at, loads, drawn] = [null, null, null, ""];
+    // What is drawn in place stands beside its sliders, below the curve.
+    const card = byId("structure");
+    if (drawnInPlace()) byId("live").after(card);
+    else byId("shape").after(card);
+    draw();
+  });
+  on("values", draw);
+  on("states", (found) => {
+    ({ states, at } = found);
+    clearTimeout(resting);
+    if (found.period) loads = { of: wish(), by: loadsOf(found.period) };
+    else if (at && drawnInPlace() && loads?.of !== wish()) resting = setTimeout(() => ask({ kind: "point", ...asked(), frequency_hz: at }, wish()), REST_MS);
+    draw();
+  });
+  new ResizeObserver(draw).observe(byId("structure-figure"));
+}
+
+const drawnInPlace = () => !current.body.structure.outline && hasPlaces(current.body, current.joints);
+const wish = () => JSON.stringify([asked(), at]);
+const loadsOf = ({ contacts }) => Object.fromEntries(contacts.map(({ name, load }) => [ownName(name), load.slice(1).reduce((sum, one) => sum + one, 0) / (load.length - 1)]));
+
+function draw() {
+  if (!current.body) return;
+  const host = byId("structure-figure");
+  const now = JSON.stringify([current.body.name, states, loads, wish(), host.clientWidth]);
+  if (now !== drawn) drawScene(host, current.body, { joints: current.joints, states, value, loads: loads?.by, stale: loads?.of !== wish() });
   drawn = now;
   show(byId("structure-states"), contactTable());
 }

@@ -74,7 +74,7 @@ function arrived(answer) {
     facts([["max |x|", length(answer.max_abs)], ["half peak to peak", length(answer.half_peak_to_peak)], ["mean", length(answer.mean)], ...states, ...notes(answer)]),
     button("Compare with the time march", () => referee()),
   );
-  tell("states", { states: Object.fromEntries(answer.period.contacts.map((c) => [c.name, c.state])), at: answer.frequency_hz });
+  tell("states", { states: Object.fromEntries(answer.period.contacts.map((c) => [c.name, c.state])), at: answer.frequency_hz, period: answer.period });
   draw();
   judged();
   if (!byId("march-status").textContent && !state.jobs.march) say("march-status", "The time march, which shares nothing with the balance, has not been asked.");
