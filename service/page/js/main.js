@@ -30,6 +30,7 @@ import { startStrip } from "./workbench/starting.js";
 const FIRST = "bladed-disk";
 const MOST_NAMES = 20;
 let sceneNames = [];
+let learned = null;
 
 async function scenes() {
   const known = await listScenes();
@@ -53,7 +54,10 @@ function screen(name) {
   byId(name === "first" ? "bar" : "rail").append(byId("foot"));
 }
 
-const first = () => showFirst(sceneNames);
+async function first() {
+  await scenes();
+  await showFirst(sceneNames);
+}
 
 // A link of the page is followed within it, in another tab or window as any.
 function follow(event, act) {
@@ -88,6 +92,7 @@ async function choose(name) {
 
 async function open() {
   screen("scene");
+  await learned;
   await loadScene(state.scene);
   const names = variedParts();
   if (!names.includes(state.contact)) Object.assign(state, { contact: names[0] ?? "", variable: "" });
@@ -123,7 +128,6 @@ async function restore() {
   tell("scene-left");
   if (!state.scene && !location.search) {
     screen("first");
-    await scenes();
     return first();
   }
   state.scene ||= FIRST;
@@ -233,14 +237,16 @@ function failed(error) {
 }
 
 async function begin() {
-  screen(state.scene || location.search ? "scene" : "first");
-  if (!isFirst()) {
+  const withScene = state.scene || location.search;
+  screen(withScene ? "scene" : "first");
+  if (withScene) {
     state.scene ||= FIRST;
     wishFirst();
   }
   try {
-    await Promise.all([loadLaws, loadKinds, scenes].map(patiently));
-    await patiently(isFirst() ? first : open);
+    learned = Promise.all([loadLaws, loadKinds].map(patiently));
+    await Promise.all([learned, patiently(withScene ? scenes : first)]);
+    if (withScene) await patiently(open);
     await Promise.all([listProjects(), listRuns()]);
   } catch (error) {
     failed(error);
