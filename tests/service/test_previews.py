@@ -106,6 +106,7 @@ def test_of_a_disk_written_out_every_sector_has_its_states(shipped: httpx.Client
         ({"kind": "sweep", "harmonics": 42}, "/harmonics"),
         ({"kind": "sweep", "set": {"damper.N9": 1}}, "/set/damper.N9"),
         ({"kind": "limits", "contact": "shroud"}, "/contact"),
+        ({"kind": "limits", "scene": "platform-wedge"}, "/scene"),
         ({"kind": "point"}, "/frequency_hz"),
         ({"kind": "point", "frequency_hz": 5e-324}, "/frequency_hz"),
         ({"kind": "shape"}, "/frequency_hz"),

@@ -366,6 +366,9 @@ def resolve_sweep(request: SweepPreviewRequest, source: SceneSource) -> Resolved
 def resolve_limits(request: LimitsPreviewRequest, source: SceneSource) -> Resolved:
     """Look up the scene and the contact."""
     scene = scene_of(request, source, 2 * POINTS_OF_A_SWEEP, 1)
+    if scene.dampers:
+        words = "has dampers that move by themselves: leave them out with `stickslip sweep --without`"
+        require([Issue(("scene",), words, scene.name)])
     names = [contact.name for contact in scene.contacts]
     if request.contact is not None and request.contact not in names:
         require([Issue(("contact",), f"must be one of {', '.join(names)}", request.contact)])

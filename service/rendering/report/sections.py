@@ -97,11 +97,12 @@ class Governing:
 
 
 def linear_lines(scene: Scene, paths: Sequence[str]) -> list[ReportLine]:
-    """The linear limits: the contacts of these parameters removed, and all stuck; none of other laws."""
+    """The linear limits: the contacts of these parameters removed, and all stuck; none of other laws
+    and of dampers, which move by themselves."""
     designed = {path.partition(".")[0] for path in paths}
     names = [contact.name for contact in scene.contacts]
     removed = [name for name in names if name in designed] or names
-    if not names or not all(contact.JENKINS for contact in scene.contacts):
+    if scene.dampers or not names or not all(contact.JENKINS for contact in scene.contacts):
         return []
     sweeps = Sweeps(harmonics=1, limit=None)
     limits = (

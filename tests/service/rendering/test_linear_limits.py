@@ -13,6 +13,7 @@ import solver
 from service.jobs.common.scene_requests import linear_limit
 from service.jobs.kinds.previews import run_limits
 from service.jobs.outputs import Silent
+from service.rendering.report.sections import linear_lines
 from solver.linear.assembly import linear_model
 from solver.linear.condensation import force_amplitudes
 from solver.response.time_history import matrices
@@ -114,3 +115,10 @@ def test_a_load_that_acts_on_the_parts_does_not_shift_them():
         assert branch.reached
         assert branch.peak.value == pytest.approx(true, rel=1e-5)
         assert abs(branch.mean).max() <= 1e-5 * true
+
+
+def test_the_report_of_dampers_has_no_linear_limits():
+    """They move by themselves: without the friction they stand nowhere."""
+    for name in ("platform-wedge", "platform-cylinder"):
+        scene = solver.load_scene(name)
+        assert linear_lines(scene, [f"{scene.dampers[0].name}.mass"]) == []

@@ -6,7 +6,7 @@ import { saveFrom, saveToml } from "../base/exports.js";
 import { betweenPoints, hertz, length, measured, notes, seconds } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 import { OF_THE_BAR } from "../scene/kinds.js";
-import { chosenContact } from "../scene/scenes.js";
+import { chosenContact, current } from "../scene/scenes.js";
 import { view } from "./view.js";
 
 const FORMS = [["CSV", "text/csv", "csv"], ["npz", "application/x-npz", "npz"], ["Parquet", "application/vnd.apache.parquet", "parquet"]];
@@ -35,7 +35,8 @@ export const response = view({
   submitted(job) {
     points = [];
     const { scene, set, harmonics } = job.request;
-    asking({ kind: "limits", scene, set: set ?? {}, harmonics: harmonics ?? 11, contact: chosenContact() }, state.scene);
+    // Dampers move by themselves: without friction they have no place.
+    if (!current.body.dampers?.length) asking({ kind: "limits", scene, set: set ?? {}, harmonics: harmonics ?? 11, contact: chosenContact() }, state.scene);
   },
   // A line until it is done; then a response with its peak, its band and its linear limits.
   points({ start, points: more }) {
@@ -65,8 +66,7 @@ function describe() {
     ...betweenPoints(result),
     ...notes(result),
     ...(result.marks ?? []).map((mark) => [mark.kind.replaceAll("_", " "), `${length(mark.amplitude)} at ${hertz(mark.at)}`]),
-    ["removed, linear", linearPeak("free")],
-    ["stuck, linear", linearPeak("stuck")],
+    ...(limits ? [["removed, linear", linearPeak("free")], ["stuck, linear", linearPeak("stuck")]] : []),
   ];
   const files = sweep
     ? el("div", { class: "row" }, el("span", { class: "note" }, "Sweep with all its arrays:"),
