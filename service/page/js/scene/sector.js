@@ -1,7 +1,7 @@
 // The sector of a disk from finite elements: the outline of its mesh, its boundaries and its contacts, in two views.
 
 import { el, note, svg } from "../base/dom.js";
-import { cross, dot, turning, unit } from "../shape/stage.js";
+import { cross, dot, plus, times, turning, unit } from "../base/vectors.js";
 import { labels } from "./labels.js";
 import { classOf, pattern, plates, stateIn, stateKey, statesOf } from "./marks.js";
 
@@ -11,8 +11,6 @@ const TURN = (50 * Math.PI) / 180;
 const TILT = (22 * Math.PI) / 180;
 const DOT = 2.6;
 const PLATE = 11;
-const times = (a, k) => a.map((value) => k * value);
-const plus = (a, b) => a.map((value, i) => value + b[i]);
 
 // Radius, circumference and axis where the sector is: blades stand upright in both views.
 function frameOf(points, axis) {

@@ -1,8 +1,10 @@
 // Dampers by their shape, as the solver has them (solver/scene/bodies/body_shapes.py): faces with their points and
 // normals, and the outlines that are drawn of them. Places are [across, outward, axial] from the middle of the damper.
 
+import { plus, times } from "../base/vectors.js";
+
 const spread = (points) => Array.from({ length: points }, (_, i) => (i + 0.5) / points - 0.5);
-const along = (mid, way, by) => mid.map((value, i) => value + by * way[i]);
+const along = (mid, way, by) => plus(mid, times(way, by));
 const LEAST = 0.15; // of a width, the half length of a face that has none
 
 // A flat face whose middle is half the width to one side, -1 left, 1 right; its points lie down it.
@@ -74,7 +76,7 @@ export const outlineOf = (damper, faces, of) => OUTLINES[damper.shape]?.(faces, 
 export const topOf = (face, height, reach) => Math.max(height + 0.2 * reach, endsOf(face)[0][1] + 0.32 * reach);
 
 // A platform over a face, to beyond its node, with the shank below and the blade above as symbols.
-export function platformOf({ shape }, face, { top, reach, bottom }) {
+export function platformOf({ shape }, face, { top, reach, bottom, sky }) {
   const { side } = face;
   const [inner, outer] = endsOf(face);
   const low = Math.min(inner[1], outer[1]);
@@ -84,7 +86,9 @@ export function platformOf({ shape }, face, { top, reach, bottom }) {
   const gap = (Math.abs(inner[0]) > 0.12 * reach ? 0.1 : 0.04) * reach;
   const lip = along(inner, face.way, (gap - Math.abs(inner[0])) * (side / face.way[0]));
   const past = along(outer, face.way, side * 0.08 * reach);
-  const edge = (turn) => Array.from({ length: 13 }, (_, i) => [i / 12, 1.75 - 0.16 * Math.sin((Math.PI * i) / 12) + turn * (0.2 + 0.08 * (1 - i / 12) ** 4)]).map(([up, x]) => at(x, top + 2.6 * up * reach));
+  // The blade bends over 2.6 times the reach; what is beyond the sky is cut.
+  const high = Math.min(Math.max((sky - top) / reach, 0.3), 2.6);
+  const edge = (turn) => Array.from({ length: 13 }, (_, i) => (i / 12) * high).map((up) => at(1.75 - 0.16 * Math.sin((Math.PI * up) / 2.6) + turn * (0.2 + 0.08 * (1 - up / 2.6) ** 4), top + up * reach));
   return {
     body: [at(0.04, top), at(0.04, lip[1]), lip, past, at(1.45, past[1]), at(1.45, bottom), at(2.05, bottom), at(2.05, low), at(2.9, low), at(2.9, top)],
     blade: [...edge(-1), ...edge(1).reverse()],

@@ -4,9 +4,10 @@ import { byId, note, numeric, show, table } from "../base/dom.js";
 import { on } from "../base/state.js";
 import { hertz, number } from "../base/format.js";
 import { previewer } from "../network/previews.js";
-import { drawBodies, hasPlaces, pointOf } from "./bodies.js";
+import { drawBodies } from "./bodies.js";
 import { drawChain } from "./chain.js";
 import { legend, ownName, statesOf } from "./marks.js";
+import { hasPlaces, pointOf } from "./place.js";
 import { asked, current, value } from "./scenes.js";
 import { drawSector } from "./sector.js";
 
@@ -43,17 +44,18 @@ export function drawScene(host, scene, { joints = jointsOf(scene), small = false
   const drawing = scene.structure.outline ? drawSector(scene, joints, { ...look, width: Math.min(width, WIDEST) })
     : hasPlaces(scene, joints) ? drawBodies(scene, joints, { ...look, small, width, height: small ? SMALL : width > WIDEST ? HIGH : LOW })
       : [drawChain(scene, joints, { ...look, width: Math.min(width, WIDEST) }), legend(), note("No [[nodes]]: not to scale.")];
-  if (small) for (const words of drawing[0].querySelectorAll("text, defs")) words.remove();
+  if (small) for (const words of drawing[0].querySelectorAll("text, title, defs, .dimension, .spot, :is(g, circle):is(.dof, .force, .press)")) words.remove();
   return show(host, small ? drawing[0] : drawing);
 }
 
 // The card follows the scene, its values and what its contacts do.
 export function startStructure() {
-  ask = previewer("loads", ({ converged, period }, { token }) => {
-    if (token !== wish() || !converged) return;
-    loads = { of: token, by: loadsOf(period) };
+  const told = (token, found) => {
+    if (token !== wish()) return;
+    loads = { of: token, ...found };
     draw();
-  }, () => undefined);
+  };
+  ask = previewer("loads", ({ converged, status, period }, { token }) => told(token, converged ? { by: loadsOf(period) } : { wrong: status }), (error, token) => told(token, { wrong: error.message }));
   on("scene", () => {
     [states, at, loads, drawn] = [null, null, null, ""];
     // What is drawn in place stands beside its sliders, below the curve.
@@ -62,12 +64,13 @@ export function startStructure() {
     else byId("shape").after(card);
     draw();
   });
+  on("scene-left", () => clearTimeout(resting));
   on("values", draw);
   on("states", (found) => {
     ({ states, at } = found);
     clearTimeout(resting);
     if (found.period) loads = { of: wish(), by: loadsOf(found.period) };
-    else if (at && drawnInPlace() && loads?.of !== wish()) resting = setTimeout(() => ask({ kind: "point", ...asked(), frequency_hz: at }, wish()), REST_MS);
+    else if (at && drawnInPlace() && loads?.of !== wish()) resting = setTimeout(ask, REST_MS, { kind: "point", ...asked(), frequency_hz: at }, wish());
     draw();
   });
   new ResizeObserver(draw).observe(byId("structure-figure"));
@@ -83,7 +86,7 @@ function draw() {
   const now = JSON.stringify([current.body.name, states, loads, wish(), host.clientWidth]);
   if (now !== drawn) drawScene(host, current.body, { joints: current.joints, states, value, loads: loads?.by, stale: loads?.of !== wish() });
   drawn = now;
-  show(byId("structure-states"), contactTable());
+  show(byId("structure-states"), loads?.wrong ? note(`No loads: ${loads.wrong}`) : null, contactTable());
 }
 
 // The contacts as a table, with what they do at the frequency `at` [Hz].

@@ -6,7 +6,6 @@ import { paperColour, saveBlob } from "../base/exports.js";
 import { hertz, measured, number } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 import { STATES } from "../scene/marks.js";
-import { stage } from "./stage.js";
 
 const PERIOD_MS = 2400;
 const STEPS = 96;
@@ -90,7 +89,7 @@ function ask(self) {
 async function arrived(self, { reached, status, shape }) {
   if (!reached) return empty(self, status, true);
   const { token } = self.wish;
-  const three = await import("../vendor/three.js");
+  const [three, { stage }] = await Promise.all([import("../vendor/three.js"), import("./stage.js")]);
   if (self.wish?.token !== token) return undefined;
   const { parts } = self;
   close(self);

@@ -1,21 +1,13 @@
 // A shape in space: what the service tells, repeated around the disk and moved through a period, drawn with WebGL.
 
+import { cross, dot, turning, unit } from "../base/vectors.js";
+
 const DRAWN = 0.1; // the largest motion, of the size of what is drawn
 const BOX = 0.021; // half an edge of a mass, of that size
 const MOST_POINTS = 150_000;
 const FIELD = (35 * Math.PI) / 180;
 const CORNERS = [0, 1, 2, 3, 4, 5, 6, 7].map((i) => [i & 1, (i >> 1) & 1, i >> 2].map((side) => 2 * side - 1));
 const SIDES = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]].flatMap(([a, b, c, d]) => [a, b, c, a, c, d]);
-export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-export const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-export const unit = (a) => a.map((v) => v / (Math.hypot(...a) || 1));
-
-// The turn about an axis of length 1 by an angle, as the rows of a matrix (Rodrigues).
-export function turning(k, angle) {
-  const [c, s] = [Math.cos(angle), Math.sin(angle)];
-  const across = [[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]];
-  return [0, 1, 2].map((i) => [0, 1, 2].map((j) => (i === j ? c : 0) + s * across[i][j] + (1 - c) * k[i] * k[j]));
-}
 
 const tokens = (host, names) => {
   const probe = host.appendChild(document.createElement("i"));

@@ -73,7 +73,8 @@ function picture(scene) {
   orNotice(async () => {
     drawScene(host, await scene, { small: true });
     const { x, y, width, height } = host.firstChild.getBBox();
-    if (width) host.firstChild.setAttribute("viewBox", `${x - EDGE} ${y - EDGE} ${width + 2 * EDGE} ${height + 2 * EDGE}`);
+    // What is drawn in place fills its frame, blades are cut there.
+    if (width && !host.querySelector(".bodies")) host.firstChild.setAttribute("viewBox", `${x - EDGE} ${y - EDGE} ${width + 2 * EDGE} ${height + 2 * EDGE}`);
   });
   return host;
 }
