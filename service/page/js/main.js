@@ -93,7 +93,7 @@ async function choose(name) {
 async function open() {
   screen("scene");
   await learned;
-  await loadScene(state.scene);
+  if (!(await loadScene(state.scene))) return;
   const names = variedParts();
   if (!names.includes(state.contact)) Object.assign(state, { contact: names[0] ?? "", variable: "" });
   fillSettings();
@@ -111,6 +111,7 @@ const change = (name) => asOneStep(async () => {
   byId("scene").value = name;
   forgetAll();
   Object.assign(state, { scene: name, set: {}, contact: "", variable: "", range: null, at: null, jobs: {} });
+  write();
   tell("scene-left");
   sceneList();
   await open().catch(failed);
@@ -157,6 +158,7 @@ const openRun = (run) => asOneStep(() => openedRun(run));
 async function openedRun({ id, kind, request }) {
   const scene = typeof request.scene === "string" ? request.scene : await storedAs(request.scene);
   if (scene !== state.scene) await change(scene);
+  if (scene !== state.scene) return;
   Object.assign(state, { set: { ...request.set }, harmonics: request.harmonics ?? state.harmonics });
   const [[path, range] = [], ...more] = Object.entries(request.variables ?? {});
   const varied = path ?? (request.from === undefined ? "" : request.parameter);

@@ -9,11 +9,13 @@ export const current = { body: null, parameters: new Map(), joints: [], studies:
 const FORCE = "excitation";
 export const listScenes = () => everyItem("/v1/scenes");
 
+// Whether it is the one that is looked at still, once the service has told.
 export async function loadScene(name) {
   const [{ scene }, { items, joints, studies }] = await Promise.all([request(`/v1/scenes/${encodeURIComponent(name)}`), request("/v1/scenes/parameters", { method: "POST", body: { scene: name } })]);
+  if (name !== state.scene) return false;
   Object.assign(current, { body: scene, joints, parameters: new Map(items.map((parameter) => [parameter.path, parameter])), studies: new Map(studies.map((study) => [study.kind, study])) });
   learnUnits(items.flatMap(({ path, name: own, unit }) => [[path, unit], [own, unit]]));
-  return current.body;
+  return true;
 }
 
 // The contacts, dampers, bodies and loads that have something to vary by hand.

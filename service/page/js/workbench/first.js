@@ -6,8 +6,7 @@ import { when } from "../base/format.js";
 import { on } from "../base/state.js";
 import { orNotice, patiently, post, request } from "../network/api.js";
 import { drawScene } from "../scene/structure.js";
-import { isUnderWay, runs } from "./run_list.js";
-import { presses, runLine } from "./runs.js";
+import { drawRuns } from "./runs.js";
 
 const MOST_RUNS = 4;
 const MOST_SCENES = 5;
@@ -21,7 +20,7 @@ const isShown = () => document.documentElement.dataset.screen === "first";
 
 export function startFirst(given) {
   acts = given;
-  on("runs", () => isShown() && drawRecent());
+  on("runs", () => byId("first-runs") && isShown() && drawRecent());
 }
 
 // Shows it, with the scenes that the service knows.
@@ -30,6 +29,7 @@ export async function showFirst(list) {
   const panel = byId("first");
   if (!panel.firstChild) build(panel);
   show(byId("first-shipped"), known.filter(({ shipped }) => shipped).map(sceneCard));
+  drawOwn();
   drawRecent();
   show(byId("first-rig"));
   templates ??= (await patiently(() => request("/v1/templates"))).items;
@@ -49,7 +49,9 @@ function build(panel) {
           button("Choose M and K…", () => acts.matrices(), { id: "first-matrices" })),
         card("From a template", el("div", { id: "first-templates", class: "templates" }), note("Or by ", button("a few questions", () => acts.newScene(), { class: "link", id: "first-questions" }), " in place of a text.")))),
       titled("first-shipped-title", "Shipped scenes", "open, drag, then copy what you like", el("div", { id: "first-shipped", class: "scene-cards" }))),
-    el("div", { id: "first-recent", class: "first-recent" }));
+    el("div", { id: "first-recent", class: "first-recent" },
+      listed("first-runs", "Recent runs", el("a", { href: "?tab=runs", class: "note", onclick: (event) => acts.follow(event, acts.runs) }, "All runs")),
+      listed("first-scenes", "Your scenes", null)));
 }
 
 // A banded matrix, as a picture.
@@ -100,18 +102,17 @@ function freeName(wanted) {
 }
 
 function drawRecent() {
-  const list = runs();
-  const busy = list.filter(isUnderWay);
-  const shown = [...busy, ...presses(list.filter((run) => !isUnderWay(run))).map(({ head }) => head)].slice(0, Math.max(MOST_RUNS, busy.length));
-  const own = known.filter(({ shipped }) => !shipped).sort((a, b) => (a.created < b.created ? 1 : -1));
-  const host = byId("first-recent");
-  host.hidden = !shown.length && !own.length;
-  show(host,
-    shown.length ? listed("first-runs-title", "Recent runs", el("a", { href: "?tab=runs", onclick: (event) => acts.follow(event, acts.runs) }, "All runs"), el("ul", { class: "plain" }, shown.map(runLine))) : null,
-    own.length ? listed("first-scenes-title", "Your scenes", own.length > MOST_SCENES ? `the last ${MOST_SCENES} of ${own.length}` : "", el("ul", { class: "plain" }, own.slice(0, MOST_SCENES).map(ownScene))) : null);
+  byId("first-runs").parentElement.hidden = !drawRuns(byId("first-runs"), MOST_RUNS);
+  byId("first-recent").hidden = [...byId("first-recent").children].every(({ hidden }) => hidden);
 }
 
-const listed = (id, words, more, list) => el("section", { class: "card", "aria-labelledby": id }, el("div", { class: "row" }, el("h2", { id }, words), el("span", { class: "note" }, more)), list);
+function drawOwn() {
+  const own = known.filter(({ shipped }) => !shipped).sort((a, b) => (a.created < b.created ? 1 : -1));
+  show(byId("first-scenes"), own.slice(0, MOST_SCENES).map(ownScene));
+  byId("first-scenes").parentElement.hidden = !own.length;
+}
+
+const listed = (id, words, more) => el("section", { class: "card", "aria-labelledby": `${id}-title` }, el("div", { class: "row" }, el("h2", { id: `${id}-title` }, words), more), el("ul", { id, class: "plain" }));
 const ownScene = ({ name, created }) => el("li", {}, sceneLink(name, "own-scene", el("span", {}, el("b", {}, name), el("span", { class: "note" }, when(created))), picture(tables(name))));
 
 // Of what a rig measured it is asked which scene that was.

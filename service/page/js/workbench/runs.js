@@ -52,29 +52,37 @@ export const peakOf = (run) => {
   return peak ? `${length(peak.value)}${worst ? " worst" : ""}` : "";
 };
 
-let seen = "";
+const seen = new WeakMap();
 
 function draw() {
   const list = runs();
-  const busy = list.filter(isUnderWay);
-  say("runs-status", busy.length ? `${busy.length} under way` : list.length ? "" : `No run${state.project ? " in this project" : ""} yet: Find the best damper makes the first ones.`);
-  const rest = presses(list.filter((run) => !isUnderWay(run))).map(({ head }) => head);
-  const shown = [...busy, ...rest.filter(isPinned), ...rest.filter((run) => !isPinned(run))].slice(0, Math.max(MOST, busy.length));
-  const now = JSON.stringify([shown.map((run) => [run.id, run.status, run.name, run.tags, summaryOf(run)?.status]), state.jobs]);
-  // The same list is not drawn anew under the focus or a press; only how far things are goes on.
-  if (now === seen) return busy.forEach(progressed);
-  seen = now;
-  return redrawn(byId("runs-list"), shown.map(runLine));
+  const busy = list.filter(isUnderWay).length;
+  say("runs-status", busy ? `${busy} under way` : list.length ? "" : `No run${state.project ? " in this project" : ""} yet: Find the best damper makes the first ones.`);
+  drawRuns(byId("runs-list"), MOST);
 }
 
-function progressed(run) {
-  const node = byId("runs-list").querySelector(`[data-run="${run.id}"]`);
+// The last runs in a list, those under way first, then pinned ones; whether there are any. The same list is not drawn anew
+// under the focus or a press: only how far things are goes on.
+export function drawRuns(host, most) {
+  const list = runs();
+  const busy = list.filter(isUnderWay);
+  const rest = presses(list.filter((run) => !isUnderWay(run))).map(({ head }) => head);
+  const shown = [...busy, ...rest.filter(isPinned), ...rest.filter((run) => !isPinned(run))].slice(0, Math.max(most, busy.length));
+  const now = JSON.stringify([shown.map((run) => [run.id, run.status, run.name, run.tags, summaryOf(run)?.status]), state.jobs]);
+  if (now === seen.get(host)) busy.forEach((run) => progressed(host, run));
+  else redrawn(host, shown.map(line));
+  seen.set(host, now);
+  return shown.length > 0;
+}
+
+function progressed(host, run) {
+  const node = host.querySelector(`[data-run="${run.id}"]`);
   if (!node) return;
   node.querySelector("progress").value = run.progress;
   node.querySelector(".run-time").textContent = `${WORDS[run.status]}${timing(run)}`;
 }
 
-export function runLine(run) {
+function line(run) {
   const title = titleOf(run);
   const open = state.jobs[run.kind] === run.id;
   const words = [peakOf(run), ...valuesOf(run, 1), wordOf(run) ?? ""].filter(Boolean).join(" · ");
