@@ -106,7 +106,7 @@ def charts() -> None:
         browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
         with serving(f"sqlite:///{Path(folder) / 'page.db'}", workers=1, log=Path(folder) / "log") as served:
             seen = browser.new_page(viewport={"width": 1280, "height": 900})
-            seen.goto(f"http://127.0.0.1:{served.port}")
+            seen.goto(f"http://127.0.0.1:{served.port}/?scene=bladed-disk")
             seen.locator("html[data-ready]").wait_for(state="attached", timeout=120_000)
             rows.append(("the page's, SVG and canvas, on D3", _compressed_own(), *_measured(seen, OURS)))
         libraries = os.environ.get("CHART_LIBRARIES")

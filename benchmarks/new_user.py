@@ -319,8 +319,7 @@ def page_from_nothing() -> list[tuple[str, ...]]:
 
 def _draw_up(hands: Hands, page: Any) -> None:
     """From the template of a blade to a blade on a disk with a damper and a stop, stored under its name."""
-    hands.press(page.locator("#scene-menu"))
-    hands.press(page.get_by_role("button", name="New scene…"))
+    hands.press(page.locator("#first-questions"))
     hands.press(page.get_by_role("button", name="Blade with a damper to the ground"))
     for label, text in ANSWERS.items():
         hands.fill(page.locator("#wizard-form").get_by_label(label), text)

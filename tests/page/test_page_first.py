@@ -255,31 +255,3 @@ def test_a_first_start_says_how_far_it_is_until_all_is_there(browser: Browser, t
             expect(page.locator("#live-status")).to_contain_text("peak")
     finally:
         site.stop()
-
-
-def tab_to(page: Page, part: str) -> None:
-    """Press Tab until it has the focus."""
-    wanted = page.locator(part).first
-    for _ in range(200):
-        if wanted.evaluate("node => node === document.activeElement"):
-            return
-        page.keyboard.press("Tab")
-    pytest.fail(f"Tab does not reach {part}")
-
-
-def test_from_the_first_screen_to_a_report_by_the_keyboard_alone(profile: Profile, site: Site) -> None:
-    page = first(profile[0], site)
-    tab_to(page, "#first-shipped a[href*=two-dof]")
-    page.keyboard.press("Enter")
-    shows(page, "two-dof")
-    tab_to(page, "#slide-damper-mu")
-    page.keyboard.press("ArrowRight")
-    expect(page.locator("#chips")).to_contain_text("damper.mu")
-    page.locator("#home").focus()  # back to the bar, as Shift and Tab
-    tab_to(page, "#study")
-    page.keyboard.press("Enter")
-    expect(page.locator("#answer-peak .large")).to_be_visible()
-    tab_to(page, "#save-report")
-    with page.expect_download() as report:
-        page.keyboard.press("Enter")
-    assert "two-dof" in Path(report.value.path()).read_text("utf-8")
