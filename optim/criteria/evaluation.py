@@ -15,9 +15,9 @@ from optim.problem.design_problem import Problem
 from optim.problem.variables import parameter_values
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects
-from solver.continuation.branch import Branch, BranchStatus
+from solver.continuation.branch import Branch
 from solver.continuation.branches.observation import observing
-from solver.continuation.branches.sweep import sweep
+from solver.continuation.branches.sweep import LOST_FROM_HERE, sweep
 from solver.continuation.stretches import Course
 from solver.continuation.walk import ContinuationSettings
 from solver.results.watch import ShouldStop
@@ -27,8 +27,6 @@ from solver.studies.peaks.peak_lines import fitted
 
 # A usual response has 80 to 800 points, and no criterion looks at peaks below this share of the highest.
 SETTINGS = ContinuationSettings(most_points=4000, unfinished_peaks=False, competes=0.5)
-
-_LOST = (BranchStatus.NO_START, BranchStatus.STALLED, BranchStatus.TURNED_BACK)
 
 
 def evaluate(
@@ -89,13 +87,13 @@ def _case(
                 )  # fmt: skip
         else:
             ends = over.hertz or here.observe.band
-            for start, stop in (ends, ends[::-1]):  # what is lost from one end may not be from the other
+            for start, stop in (ends, ends[::-1]):  # without a beginning `sweep` goes to the other end itself
                 branch = sweep(
                     here, start=start, stop=stop, harmonics=problem.harmonics, limit=problem.limit,
                     settings=settings, effects=effects, should_stop=should_stop,
                     course=None if there is None else _begin(problem, here, effects, there, stop < start),
                 )  # fmt: skip
-                if branch.status not in _LOST:
+                if there is None or branch.status not in LOST_FROM_HERE:
                     break
         responses.append(CaseResponse(case=case.name, branch=branch, shared=shared))
         rows += rows_of(problem, case, branch, over, gradients=gradients)

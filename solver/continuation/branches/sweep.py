@@ -64,9 +64,8 @@ from solver.scene.scene import Scene
 # root of how many go along with each: so do its steps.
 DEAR, _LONGER, _ALONG = 1000, 2.5, 48
 _MOST_FOLLOWED = 500  # points of a look at a resonance beside the branch
-_LOST = (
-    BranchStatus.STALLED, BranchStatus.TURNED_BACK, BranchStatus.TOO_MANY_POINTS, BranchStatus.POWER_LOST,
-)  # fmt: skip
+LOST_FROM_HERE = (BranchStatus.NO_START, BranchStatus.STALLED, BranchStatus.TURNED_BACK)
+_LOST = (*LOST_FROM_HERE[1:], BranchStatus.TOO_MANY_POINTS, BranchStatus.POWER_LOST)
 
 LEAST, STEP = 40, 0.015  # intervals of a range at least, and share of a frequency that one is long at most
 
@@ -89,7 +88,7 @@ def sweep(
     parameter : path of the parameter, for example ``frequency`` or ``shroud.N0``. The ``speed`` along an
         engine-order line is the frequency in other units: the branch is one over the frequency.
     start, stop : the range in user units (Hz for a frequency, the scene's band if left out; 1/min for a
-        speed).
+        speed). A response that is lost from `start` on is followed from `stop`, and begins there.
     harmonics : highest harmonic kept, unless `accuracy` is given.
     accuracy : estimated error, relative to the amplitude, that the harmonics are chosen for; see
         `solver.continuation.branches.adaptive_harmonics.harmonics_for` for where and how it is judged.
@@ -126,7 +125,12 @@ def sweep(
 
     def with_harmonics(count: int, course: Course) -> Branch:
         balance = build(scene, parameter, harmonics=count, frequency_hz=frequency_hz, effects=effects)
-        return _swept(balance, start, stop, limit, settings, course, on_progress, should_stop)
+        found = _swept(balance, start, stop, limit, settings, course, on_progress, should_stop)
+        if parameter != FREQUENCY or found.status not in LOST_FROM_HERE or course.guess is not None:
+            return found
+        again = Course(on_points=course.on_points)
+        other = _swept(balance, stop, start, limit, settings, again, on_progress, should_stop)
+        return found if other.status in LOST_FROM_HERE else other
 
     if accuracy is None:
         return with_harmonics(harmonics, course)
@@ -149,14 +153,10 @@ def _swept(
         count += len(stretch.solutions)
         if course.on_stretch is not None and stretch is not course.resume:
             course.on_stretch(stretch)
-        if stretch.measures[:, MAX_ABS].max(initial=0.0) > settings.highest:
-            status = BranchStatus.TOO_HIGH
-            break
-        if stretch.status is not None:
-            status = stretch.status
-            break
-        if comes_back(stretches):
-            status = BranchStatus.STALLED
+        high = stretch.measures[:, MAX_ABS].max(initial=0.0) > settings.highest
+        ended = BranchStatus.TOO_HIGH if high else stretch.status
+        if ended is not None or comes_back(stretches):
+            status = ended or BranchStatus.STALLED
             break
         if course.on_points is not None:
             values = balance.parameter.all_outside(stretch.solutions[:, -1].copy())

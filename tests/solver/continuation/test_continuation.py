@@ -16,6 +16,7 @@ from lumped_structure import lumped
 from scene_cases import bladed_disk, loose_mass, mixed_disk, oscillator, two_dof
 from walked_branches import UNSTABLE, walked, with_damping
 
+import solver
 from solver import BranchStatus, ContinuationSettings, Predictor, Scene, march, solve, sweep
 from solver.balance.balance import build
 from solver.balance.kernels.output import RESIDUAL
@@ -346,3 +347,17 @@ def test_folds_that_are_kinks_are_passed(level: float, damping: float, predictor
     turns = np.count_nonzero(np.diff(np.sign(np.diff(found.values))))
     assert turns >= 2
     assert turns % 2 == 0
+
+
+def test_a_response_that_is_lost_from_one_end_is_followed_from_the_other():
+    """Lightly pressed shrouds: from 280 Hz a sweep meets another branch, which turns and leaves the band."""
+    scene = solver.load_scene("shroud-3d").with_values({"shroud.N0": 10.0})
+    points: list[float] = []
+    branch = solver.sweep(scene, on_points=lambda at, _: points.extend(at))
+    assert branch.status is BranchStatus.COMPLETED
+    assert (branch.values[0], branch.values[-1]) == (520.0, 280.0)
+    assert branch.measures[:, RESIDUAL].max() <= 1e-9
+    assert points[0] == 520.0
+    # Given where to begin it stays there.
+    lost = solver.sweep(scene, guess=np.zeros(branch.balance.n_unknowns))
+    assert lost.status is BranchStatus.TURNED_BACK
