@@ -250,6 +250,10 @@ def test_scenes(http: httpx.Client) -> None:
     )
     assert all(0 < len(one["title"]) < 110 for one in listed.values() if one["shipped"])
     scene = http.get("/v1/scenes/two-dof").json()["scene"]
+    whole, drawn = (http.get("/v1/scenes/fe-disk", params={"files": files}) for files in (True, False))
+    left_out = whole.json()["scene"]["structure"].keys() - drawn.json()["scene"]["structure"].keys()
+    assert "diameters" in left_out
+    assert len(drawn.content) < 0.01 * len(whole.content)
     is_problem(http.get("/v1/scenes/..%2Ftwo-dof"), 404)
     same = http.post("/v1/scenes", json=scene)
     assert same.status_code == 200

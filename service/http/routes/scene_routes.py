@@ -17,7 +17,7 @@ from service.http.in_lane import computed, prepared, reading
 from service.jobs import answering
 from service.jobs.answering import PLAN, PREVIEW, STORE
 from service.jobs.common.scene_parameters import SceneParameterList
-from service.jobs.common.scene_requests import SceneRequest
+from service.jobs.common.scene_requests import FILE_KEYS, SceneRequest
 from service.jobs.kind_registry import KIND, asked_of
 from service.jobs.kinds.bodies import any_body, examples
 from service.jobs.kinds.previews import PREVIEWS, PreviewRequest
@@ -74,6 +74,9 @@ class EditRequest(AskedModel):
 ReadBody = Annotated[ReadRequest, Body(openapi_examples={"read": {"value": _FILE}})]
 TextBody = Annotated[TextRequest, Body(openapi_examples={"text": {"value": _SCENE}})]
 ParametersBody = Annotated[SceneRequest, Body(openapi_examples={"wedge": {"value": _WEDGE}})]
+OfFiles = Annotated[
+    bool, Query(description="Whether with what its files held; a drawing needs none.")
+]
 EditBody = Annotated[EditRequest, Body(openapi_examples={"edit": {"value": _EDIT}})]
 
 
@@ -158,9 +161,9 @@ def list_scenes(context: InContext, query: Annotated[SceneQuery, Query()]) -> Sc
 
 @router.get("/{name}")
 @reading
-def get_scene(name: str, context: InContext) -> SceneDetail:
+def get_scene(name: str, context: InContext, *, files: OfFiles = True) -> SceneDetail:
     """A scene with its tables: a shipped one, or one of one's own."""
-    return _whole(context.service.scenes.of(context.caller).get(name))
+    return _whole(context.service.scenes.of(context.caller).get(name), files=files)
 
 
 @router.post(
@@ -178,8 +181,11 @@ async def store_scene(body: JsonBody, context: InContext, response: Response) ->
     return _whole(scene)
 
 
-def _whole(scene: StoredScene) -> SceneDetail:
-    return SceneDetail.of(scene, scene=dict(scene.body))
+def _whole(scene: StoredScene, *, files: bool = True) -> SceneDetail:
+    body: dict[str, Any] = dict(scene.body)
+    if not files:
+        body["structure"] = {key: held for key, held in body["structure"].items() if key not in FILE_KEYS}
+    return SceneDetail.of(scene, scene=body)
 
 
 def _keep(context: Context, found: dict[str, Any]) -> tuple[StoredScene, bool]:

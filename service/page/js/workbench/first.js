@@ -63,9 +63,9 @@ function matrix(name) {
     svg("text", { x: MATRIX / 2, y: 39, "text-anchor": "middle", class: "halo" }, name));
 }
 
-// The tables of a scene, asked for once: a name keeps its meaning.
+// The tables of a scene without its matrices, asked for once: a name keeps its meaning.
 function tables(name) {
-  if (!scenes.has(name)) scenes.set(name, patiently(() => request(`/v1/scenes/${encodeURIComponent(name)}`)).then(({ scene }) => scene));
+  if (!scenes.has(name)) scenes.set(name, patiently(() => request(`/v1/scenes/${encodeURIComponent(name)}?files=false`)).then(({ scene }) => scene));
   return scenes.get(name);
 }
 
