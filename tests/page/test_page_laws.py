@@ -133,7 +133,7 @@ def test_a_damper_between_blades_is_drawn_varied_and_designed(page_of: Any) -> N
     """The wedge of a shipped scene: sliders of its mass, friction and angle, which the response follows."""
     page = page_of("platform-wedge")
     assert {"mass of wedge", "μ of wedge", "angle of wedge"} <= set(sliders(page))
-    expect(page.get_by_role("img", name=re.compile("springs; wedge"))).to_be_visible()
+    expect(page.get_by_role("img", name=re.compile("to scale: wedge"))).to_be_visible()
     expect(page.locator("#structure-states")).to_contain_text("wedge")
     expect(page.locator("#structure-states")).not_to_contain_text("linear")
     assert {"wedge.mass", "wedge.mu", "wedge.kn", "speed"} <= set(variables(page))

@@ -8,7 +8,7 @@ import { drawBodies } from "./bodies.js";
 import { drawChain } from "./chain.js";
 import { legend, ownName, statesOf } from "./marks.js";
 import { hasPlaces, pointOf } from "./place.js";
-import { asked, current, value } from "./scenes.js";
+import { asked, current, fieldUnit, inField, value } from "./scenes.js";
 import { drawSector } from "./sector.js";
 
 const WIDEST = 560;
@@ -98,9 +98,9 @@ function contactTable() {
   const laws = new Set(joints.map(({ law }) => law)).size > 1;
   const rows = joints.map((joint) => [
     joint.name, joint.between.join(" – "), statesOf(states, joint), ...(laws ? [joint.law] : []),
-    ...columns.map(({ name, unit }) => {
+    ...columns.map(({ name }) => {
       const path = `${joint.name}.${name}`;
-      return numeric(own(current.parameters.get(path) ?? {}) ? `${number(value(path))} ${unit}`.trim() : "");
+      return numeric(own(current.parameters.get(path) ?? {}) ? `${number(inField(path, value(path)))} ${fieldUnit(path).name}`.trim() : "");
     }),
   ]);
   const heads = columns.map(({ symbol }) => numeric(symbol));
