@@ -16,8 +16,8 @@ from solver.errors import Issue
 from solver.scene.editing import TextPlace, edited, place_at, places
 from solver.scene.toml import TomlError, read_toml
 
-MOST_OF_TOML = 1_200_000
-"""Characters of a text in TOML: a sector of finite elements with the matrices of its nodal diameters has a
+MOST_OF_TOML = 1_500_000
+"""Characters of a text in TOML: a sector of finite elements with the matrices of its nodal diameters has 1.4
 million. What takes long to read in so many meets the limit of time of an answer."""
 
 _WORD = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
