@@ -27,7 +27,6 @@ pytestmark = pytest.mark.long
 COLOURS = 256
 TRIES = 5
 VIEWS = (
-    "structure",
     "live",
     "problem",
     "design",
@@ -60,6 +59,17 @@ def studied(page: Page, site: Site, words: str = "") -> None:
     page.click("#study")
     expect(page.locator("#study-status")).to_have_text("Everything is there.", timeout=300_000)
     expect(page.locator("#march-status")).to_contain_text("% apart", timeout=60_000)
+
+
+def test_a_wedge_in_place(browser: Browser, site: Site, tmp_path: Path) -> None:
+    where = folder(tmp_path)
+    where.mkdir(parents=True, exist_ok=True)
+    with opened(browser, site) as (context, _):
+        page = context.new_page()
+        page.set_viewport_size({"width": 1024, "height": 900})
+        page.goto(f"{site.url}/?scene=platform-wedge&tab=response")
+        expect(page.locator("#structure-figure > svg g.load:not(.stale)")).to_have_count(4)
+        keep(page.locator("#structure"), where / "structure.png")
 
 
 def test_every_view_of_the_bladed_disk(browser: Browser, site: Site, tmp_path: Path) -> None:
