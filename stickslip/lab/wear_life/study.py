@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _OF_A_CHOICE = ("parameter", "start", "stop", "from_hours", "factors", "looks")
 _OF_A_LIFE = ("limit", "paths", "points", "tolerance")
 _CHOOSING, _CLOSING = 0.8, 10  # share of the time of a choice, and lives that close in on it
-_HOURS, _COEFFICIENT, _AREA = 1000.0, 1e-14, 1e-4  # are proposed
+_HOURS, _COEFFICIENT, _AREA = 5.0, 1e-14, 1e-4  # are proposed
 _STEPS = 20  # over the hours, each with a look at the whole band
 _OfContacts = list[Curve]
 _Block = Annotated[list[PositiveNumber], Field(min_length=2, max_length=2)]
@@ -119,8 +119,8 @@ class Wear(Study, HarmonicRequest):
 
     @classmethod
     def propose(cls, scene: Scene) -> Proposed | str:
-        """A thousand hours; coefficient and area of its contacts are assumed, and what a depth takes as well
-        where the contact has no normal stiffness."""
+        """Five hours at the peak; coefficient and area of its contacts are assumed, and what a depth takes of
+        the load where a contact has no normal stiffness."""
         rubbing = {c.group or c.name: c for c in scene.contacts if c.load is not None and hasattr(c, "mu")}
         if not rubbing:
             return "The scene has no contact that rubs and wears."
