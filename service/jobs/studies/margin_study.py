@@ -19,7 +19,8 @@ from solver.scene.descriptions import DAMPER_LOAD
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
-_AROUND, _ALLOWED = 4.0, 1.5  # of the excitation, and of its peak, what is proposed
+# Of the excitation from and to, and of its peak, what is proposed: its range holds what reaches that limit.
+_LEAST, _MOST, _ALLOWED = 0.25, 2.0, 1.5
 _Values = Annotated[dict[ParameterPath, Number], Field(max_length=1000)]
 _Dampers = Annotated[dict[Name, _Values], Field(min_length=1, max_length=50)]
 
@@ -63,7 +64,7 @@ class Margin(Study, HarmonicRequest):
         if not force:
             return "The scene has no excitation."
         strengths = any(one.material is not None for one in scene.recovery)
-        ends = {"from": rounded(force / _AROUND), "to": rounded(force * _AROUND)}
+        ends = {"from": rounded(_LEAST * force), "to": rounded(_MOST * force)}
         return Proposed(ends, of_peak={} if strengths else {"limit": _ALLOWED})
 
     def issues(self, scene: Scene) -> list[Issue]:
