@@ -31,7 +31,7 @@ MOST_DOFS = 400
 SAMPLES = 97
 """Of a loop, its first again at the end."""
 FAR = 100.0
-_MODAL = (1e-7, 0.1)  # √kg m, where nothing says at which motion contacts begin to slip
+_MODAL = (1e-7, 1e-3)  # √kg m, where nothing says at which motion contacts begin to slip
 _AROUND_SLIP = (0.05, 300.0)
 _EXACT_PEAKS = 8
 _AMPLITUDE = "excitation.amplitude"
