@@ -74,9 +74,7 @@ class EditRequest(AskedModel):
 ReadBody = Annotated[ReadRequest, Body(openapi_examples={"read": {"value": _FILE}})]
 TextBody = Annotated[TextRequest, Body(openapi_examples={"text": {"value": _SCENE}})]
 ParametersBody = Annotated[SceneRequest, Body(openapi_examples={"wedge": {"value": _WEDGE}})]
-OfFiles = Annotated[
-    bool, Query(description="Whether with what its files held; a drawing needs none.")
-]
+OfFiles = Annotated[bool, Query(description="Whether with what its files held; a drawing needs none.")]
 EditBody = Annotated[EditRequest, Body(openapi_examples={"edit": {"value": _EDIT}})]
 
 
