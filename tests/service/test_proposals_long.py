@@ -18,7 +18,10 @@ from stickslip.lab.wear_life.life_result import WearLifeStatus
 pytestmark = pytest.mark.long
 OF_A_RIG = ("identify", "posterior")
 NOISE, POINTS, FORCE = 0.01, 9, "excitation.amplitude"
-# What such a study finds may be that the damper does not last so long.
+# Two forces on the disk of eight blades are told to a few per cent only, and some points of the lightly
+# pressed shroud are not solved: both say so.
+FALLS_SHORT = {("bladed-disk", "quasi-periodic"), ("shroud-3d", "map")}
+# What a study of wear finds may be that the damper does not last so long.
 ANSWERS = {WearLifeStatus.WORN_OUT.value}
 
 
@@ -51,4 +54,5 @@ def test_a_study_is_answered_by_its_proposal(name: str, kind: str) -> None:
     assert (asked.issues(scene) or asked.sizes(scene)) == []
     found = study.run(resolved(scene, **asked.spec(scene)).spec, Silent(), lambda: False)
     assert found.result
-    assert found.shortfall is None or found.shortfall in ANSWERS
+    short = found.shortfall is not None and found.shortfall not in ANSWERS
+    assert short is ((name, kind) in FALLS_SHORT), found.shortfall
