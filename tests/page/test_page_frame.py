@@ -77,7 +77,7 @@ def test_the_rail_is_a_drawer_where_there_is_no_room(profile: Profile, site: Sit
         expect(page.locator("#rail")).to_be_hidden()
         expect(page.locator("#rail-open")).to_be_focused()
         page.click("#rail-open")
-        page.locator("#scene-list button", has_text=scene).click()
+        page.locator("#scene-list").get_by_role("button", name=scene, exact=True).click()
         expect(page.locator("#rail")).to_be_hidden()
         expect(page.locator("#scene")).to_have_value(scene)
         assert page.evaluate(SIDEWAYS) <= 0

@@ -44,7 +44,7 @@ def test_matrices_become_a_scene_and_its_response(profile: Profile, site: Site, 
     page.set_input_files("#matrix-input", ANSYS)
     report = page.locator("#matrix-report")
     expect(report).to_contain_text("named: nodes 2 to 21, ROTZ, UY")
-    expect(report).to_contain_text("0.05811 kg in UY")
+    expect(report).to_contain_text("58.11 g in UY")
     expect(report).to_contain_text("1142, 7158")
     expect(page.get_by_label("blade K.matrix (")).to_have_value("K")
     found = axe.Axe().run(page).response["violations"]
