@@ -124,7 +124,7 @@ def test_the_range_and_the_harmonics_make_a_design_stale_too(
     expect(page.locator("#answer-certificate .large")).to_have_text(FOUND)
     page.fill("#high", "900")
     page.press("#high", "Tab")
-    expect(page.locator("#answer-stale")).to_contain_text("damper.N0 from 10 to 1500 N, now 10 to 900 N")
+    expect(page.locator("#answer-stale")).to_contain_text("damper.N0 from 10 N to 1500 N, now 10 N to 900 N")
     expect(page.locator("#response-stale")).to_be_hidden()
     page.fill("#high", "1500")
     page.fill("#harmonics", "7")

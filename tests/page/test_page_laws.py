@@ -144,6 +144,7 @@ def test_a_damper_between_blades_is_drawn_varied_and_designed(page_of: Any) -> N
     expect(angle.locator("input[type=number]")).to_have_value("20.0535")  # 0.35 rad
     expect(page.locator("#variable-unit")).to_have_text("g")
     assert (page.input_value("#low"), page.input_value("#high")) == ("0.4", "60")
+    expect(page.locator("#search-words")).to_have_text("wedge.mass 0.4 g – 60 g")
     page.fill("#slide-wedge-mass >> xpath=../span/input", "8")
     page.press("#slide-wedge-mass >> xpath=../span/input", "Tab")
     expect(page).to_have_url(re.compile(r"set=wedge\.mass:0\.008"))

@@ -1,7 +1,7 @@
 // What a result was computed for, against what is set now.
 
 import { state } from "../base/state.js";
-import { number, quantity } from "../base/format.js";
+import { quantity } from "../base/format.js";
 import { hasHarmonics } from "./kinds.js";
 import { givenByScene, variable, variables } from "./scenes.js";
 
@@ -40,7 +40,7 @@ function changedRange(request) {
   if (path !== variable()) return [`${path} varied, now ${variable() || "nothing"}`];
   const [from, to] = state.range;
   if (same(low, from) && same(high, to)) return [];
-  return [`${path} from ${number(low)} to ${quantity(path, high)}, now ${number(from)} to ${quantity(path, to)}`];
+  return [`${path} from ${quantity(path, low)} to ${quantity(path, high)}, now ${quantity(path, from)} to ${quantity(path, to)}`];
 }
 
 // In words, what has changed since a study of a kind was asked; empty if nothing.

@@ -73,7 +73,7 @@ function putBack(path) {
 
 function sayWhat() {
   const path = variable();
-  byId("search-words").textContent = path && state.range ? `${path} ${state.range.join(" – ")} ${byId("variable-unit").textContent}` : "–";
+  byId("search-words").textContent = path && state.range ? `${path} ${state.range.map((end) => quantity(path, end)).join(" – ")}` : "–";
 }
 
 const THEME = "stickslip-theme";
