@@ -15,13 +15,13 @@ import { hasOwnView, viewOf } from "../views.js";
 import { tabOf } from "../workbench/frame.js";
 import { complaining, view } from "./view.js";
 
-const ROWS = 200;
+const [ROWS, MEASURED] = [200, ["identify", "posterior"]];
 const GROUPS = [["", "All"], ["damper", "Damper"], ["life", "Life"], ["engine", "Engine"], ["rig", "Rig"], ["checks", "Checks"]];
-const MEASURED = ["identify", "posterior"];
-// What comes out, as a stroke in a frame of 112 by 70.
+// What comes out, as a stroke in a frame of 112 by 70: of a kind, else of its group.
 const PICTURES = {
   damper: "M6 18C30 24 44 58 58 58S92 44 108 22", life: "M6 60C50 58 82 52 108 12M6 36H108", engine: "M6 66L108 10M6 66L108 36M6 30H108M6 48H108",
   rig: "M6 62C38 60 46 52 54 14C60 10 62 50 70 58S96 62 108 62", checks: "M14 64V40M32 64V30M50 64V46M68 64V14M86 64V36M104 64V50",
+  margin: "M6 62C46 58 80 46 108 8M6 30H108", sweep: "M6 62C40 60 48 52 54 12C62 52 74 58 108 62", pareto: "M10 8C14 44 40 58 106 62", solve: "M22 60L46 12H92L68 60Z", march: "M6 35C14 6 22 6 30 35S46 64 54 35 70 6 78 35 94 64 102 35", transient: "M6 36C10 28 14 28 18 36S26 46 32 36 42 16 48 36 58 64 66 36 76 8 84 36 94 58 102 36", modes: "M64 66V44C64 32 54 20 38 8", accuracy: "M8 10L40 30L72 44L104 60",
 };
 const cards = new Map();
 let group = "";
@@ -68,7 +68,7 @@ function cardOf(kind) {
   const { title, group: of } = asks(kind);
   const refused = refusedFor(kind);
   return el("article", { class: `card question${refused ? " refused" : ""}`, id: `ask-${kind}`, "data-of": of, "aria-labelledby": `ask-${kind}-title` },
-    svg("svg", { viewBox: "0 0 112 70", "aria-hidden": "true" }, svg("path", { class: "frame", d: "M4 2V68H110" }), svg("path", { d: PICTURES[of] })),
+    svg("svg", { viewBox: "0 0 112 70", "aria-hidden": "true" }, svg("path", { class: "frame", d: "M4 2V68H110" }), svg("path", { d: PICTURES[kind] ?? PICTURES[of] })),
     el("div", {}, el("h3", { id: `ask-${kind}-title` }, title), note(refused || kindOf(kind).summary)),
     refused ? null : [el("p", { class: "note", id: `ask-${kind}-bar` }), el("form", { id: `ask-${kind}-form`, novalidate: true }), el("div", { class: "row" }, el("span", { class: "status", id: `ask-${kind}-status`, role: "status" }), button("Open", () => open(kind), { id: `ask-${kind}-open`, hidden: true })), el("div", { id: `ask-${kind}-result` })]);
 }
