@@ -31,6 +31,7 @@ from fault_kinds import (
 from fault_site import Site, clients
 from launch import free_port
 from postgresql_cluster import Cluster
+from service_helpers import until
 from sqlalchemy import func, select
 
 from service.db.engine import Database
@@ -54,6 +55,7 @@ def undergo(site: Site, faults: Mapping[str, Fault], number: int, seed: int) -> 
     began = time.monotonic()
     with site:
         with clients(site, jobs=(5 if number < 10 else 8) * number, seed=seed):
+            until(lambda: site.accepted)  # a service that still starts has no work to lose
             for index in range(number):
                 time.sleep(generator.uniform(0.05, 0.4))
                 name = names[index % len(names)] if index < len(names) else generator.choice(names)
