@@ -111,8 +111,8 @@ async function follow() {
 function told(run) {
   const before = known.get(run.id);
   tell("run", run);
-  if (!before && !isUnderWay(run) && !isListed(run)) return;
-  known.set(run.id, { ...run, request: undefined });
+  if (isUnderWay(run) || isListed(run)) known.set(run.id, { ...run, request: undefined });
+  else if (!known.delete(run.id)) return; // what has ended stands with its own project alone
   changed();
   if (before && isUnderWay(before) && !isUnderWay(run)) tell("run-ended", run);
 }
