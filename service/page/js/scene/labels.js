@@ -9,8 +9,8 @@ const AROUND = [[1, 0], [-1, 0], [0, -1], [0, 1], [0.8, -0.8], [-0.8, -0.8], [0.
 let pen = null;
 
 function widthOf(words, bold) {
-  pen ??= document.createElement("canvas").getContext("2d");
-  pen.font = `${bold ? 700 : 400} 12px ${getComputedStyle(document.body).fontFamily}`;
+  pen ??= Object.assign(document.createElement("canvas").getContext("2d"), { family: getComputedStyle(document.body).fontFamily });
+  pen.font = `${bold ? 700 : 400} 12px ${pen.family}`;
   return 1.03 * pen.measureText(words).width + 2;
 }
 

@@ -73,7 +73,7 @@ export function startStructure() {
     else if (at && drawnInPlace() && loads?.of !== wish()) resting = setTimeout(ask, REST_MS, { kind: "point", ...asked(), frequency_hz: at }, wish());
     draw();
   });
-  new ResizeObserver(draw).observe(byId("structure-figure"));
+  new ResizeObserver(() => { drawn = ""; draw(); }).observe(byId("structure-figure"));
 }
 
 const drawnInPlace = () => !current.body.structure.outline && hasPlaces(current.body, current.joints);
@@ -82,9 +82,9 @@ const loadsOf = ({ contacts }) => Object.fromEntries(contacts.map(({ name, load 
 
 function draw() {
   if (!current.body) return;
-  const host = byId("structure-figure");
-  const now = JSON.stringify([current.body.name, states, loads, wish(), host.clientWidth]);
-  if (now !== drawn) drawScene(host, current.body, { joints: current.joints, states, value, loads: loads?.by, stale: loads?.of !== wish() });
+  // Under a slider only what stands in place changes, and elsewhere the force that is written.
+  const now = JSON.stringify([current.body.name, states, drawnInPlace() ? [loads, wish()] : value("excitation.amplitude")]);
+  if (now !== drawn) drawScene(byId("structure-figure"), current.body, { joints: current.joints, states, value, loads: loads?.by, stale: loads?.of !== wish() });
   drawn = now;
   show(byId("structure-states"), loads?.wrong ? note(`No loads: ${loads.wrong}`) : null, contactTable());
 }
