@@ -15,13 +15,15 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from solver.balance.balance import fewer_harmonics
 from solver.balance.contact_hessian import check_no_line
+from solver.balance.workspace import FEWEST_HARMONICS
 from solver.errors import SettingError
 from solver.jit.timer import clock
 from solver.jit.fourier import Real, cosine_position
 from solver.modes.mode_curve import Corrected, ModeState, correct
 from solver.modes.mode_curve import FollowedCurve, follow
-from solver.modes.mode_equations import Held
+from solver.modes.mode_equations import BESIDES, Held
 from solver.modes.mode_start import slopes_at_rest
 from solver.continuation.bracketing import least_between
 from solver.response.stability.cost import left_out
@@ -30,6 +32,7 @@ from solver.modes.nonlinear_mode import PointRecord, Recorder, Wider, last_unkno
 from stickslip.lab.controlled.held_result import HeldAmplitude, HeldStatus, LeastForce
 from solver.response.stability.floquet import motions_stability
 from solver.scene.parameter_paths import check_frequency
+from solver.scene.scene_harmonics import spread
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -184,7 +187,9 @@ def _stable(
 
 
 def first_held(equations: Held, rest: Real, omega: float) -> Corrected:
-    """Return the response at ω with the amplitude asked for; from smaller ones upward where it must.
+    """Return the response at ω with the amplitude asked for.
+
+    Where Newton's method does not lead there, it begins with fewer harmonics, or with smaller amplitudes.
 
     Parameters
     ----------
@@ -193,6 +198,8 @@ def first_held(equations: Held, rest: Real, omega: float) -> Corrected:
     wanted = equations.target
     guess = _linear(equations, rest, omega)
     found = _solved(equations, guess)
+    if not found.converged:
+        found = _from_fewer(equations, rest, omega) or found
     for rung in range(1, _RUNGS + 1):
         if found.converged:
             break
@@ -213,6 +220,23 @@ def first_held(equations: Held, rest: Real, omega: float) -> Corrected:
             found = replace(there, converged=False)
     equations.target = wanted
     return replace(found, iterations=spent)
+
+
+def _from_fewer(equations: Held, rest: Real, omega: float) -> Corrected | None:
+    """Return the response at ω found from that with fewer harmonics; None if it is not."""
+    ks = equations.structure.ks
+    fewer = equations.over(fewer_harmonics(equations.balance, max(2 * ks.size // 3, FEWEST_HARMONICS)))
+    few = fewer.structure.ks
+    if few.size == ks.size:
+        return None
+    begun = first_held(fewer, spread(rest, ks, few), omega)
+    if not begun.converged:
+        return None
+    w = spread(begun.state.y[: fewer.size].reshape(fewer.r, fewer.n), few, ks)
+    y = np.append(w, begun.state.y[-BESIDES:])
+    y[-1] *= fewer.unit / equations.unit
+    found = _solved(equations, replace(begun.state, y=y))
+    return replace(found, iterations=begun.iterations + found.iterations) if found.converged else None
 
 
 def _solved(equations: Held, guess: ModeState) -> Corrected:
