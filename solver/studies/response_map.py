@@ -259,5 +259,11 @@ def _row(
             solutions[at], known[at] = found.u, GIVEN
         else:
             at += 1
+    for at in np.flatnonzero((known[:-1] != SOLVED) & (known[1:] == SOLVED)):
+        solutions[at], known[at] = solutions[at + 1], GIVEN  # some only the next one leads to
+        spent += solve_row(
+            workspace.system, workspace.linear, workspace.point, omegas[: at + 1], at, *before, solutions,
+            known, values,
+        )[1]  # fmt: skip
     known[known != SOLVED] = 0
     return (solutions, known), spent
