@@ -62,7 +62,8 @@ from solver.scene.scene import Scene
 # Unknowns from which a point is so dear that the largest step is longer, and how much: the survey adds what
 # it needs. Where fewer motions lead the others so is the first one, and of so many ports the arc grows by the
 # root of how many go along with each: so do its steps.
-DEAR, _LONGER, _ALONG = 1000, 2.5, 48
+# Forces in space are dear from fewer unknowns on.
+DEAR, _LONGER, _DEAR_FORCES, _LONGER_THERE, _ALONG = 1000, 2.5, 200, 2.0, 48
 _MOST_FOLLOWED = 500  # points of a look at a resonance beside the branch
 LOST_FROM_HERE = (BranchStatus.NO_START, BranchStatus.STALLED, BranchStatus.TURNED_BACK)
 _LOST = (*LOST_FROM_HERE[1:], BranchStatus.TOO_MANY_POINTS, BranchStatus.POWER_LOST)
@@ -239,10 +240,11 @@ def walk_branch(
     begun = clock() - (0.0 if resume is None else resume.seconds)
     balance, inside = workspace.balance, workspace.balance.parameter.inside
     pace = settings.pace
-    if balance.n_unknowns >= DEAR:
-        first = (_LONGER if is_spanned(workspace.system) else 1.0) * pace.first
-        pace = replace(pace, first=first, largest=_LONGER * pace.largest)
-    if is_spanned(workspace.system) and balance.n_ports >= _ALONG:
+    spanned, dear = is_spanned(workspace.system), balance.n_unknowns >= DEAR
+    if dear or (balance.n_unknowns >= _DEAR_FORCES and balance.system.alone.any()):
+        longer = _LONGER if dear else _LONGER_THERE
+        pace = replace(pace, first=(longer if spanned else 1.0) * pace.first, largest=longer * pace.largest)
+    if spanned and balance.n_ports >= _ALONG:
         pace = replace(pace, largest=math.sqrt(balance.n_ports / balance.n_leading) * pace.largest)
     control = control_of(settings, inside(start), inside(stop), pace)
     if resume is None:
