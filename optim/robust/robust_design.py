@@ -196,7 +196,9 @@ def _run(
     search.problem = replace(search.problem, harmonics=posed.harmonics, cases=posed.cases)
     status = _ended(search, drawn, state)
     while status is RobustStatus.NOT_KNOWN and 2 * search.problem.harmonics <= most:
-        earlier, again = search.problem, _State(nominal=state.nominal)
+        # With fewer harmonics the designs are ranked: where that search ended, this one begins.
+        begun = SearchProgress(cuts=[*state.progress.cuts], best=state.progress.best)
+        earlier, again = search.problem, _State(nominal=state.nominal, progress=begun)
         search.problem = replace(earlier, harmonics=2 * earlier.harmonics)
         status = _ended(search, drawn, again)
         if "robust" not in again.sides:

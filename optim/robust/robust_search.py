@@ -284,21 +284,23 @@ def _cut(scenario: Scenario, peak: float = math.nan, exceeds: float = math.nan) 
 def cutting_sets(
     search: RobustSearch, nominal: DesignResult, drawn: Sequence[Scenario], progress: SearchProgress
 ) -> RobustStatus:
-    """Minimise the worst case; `progress` is kept up to date.
+    """Minimise the worst case; `progress` is kept up to date, and begun from where it is given.
 
     Raises
     ------
     StoppedError, UnknownScenarioError
         The caller asked to stop; a scenario could not be computed.
     """
-    first = dict(nominal.optimum) if nominal.optimum else _coarse(search.problem)[0]
-    for scenario in search.uncertain.middle():
-        progress.add(search.outcome(first, scenario), math.nan)
-    if nominal.evaluation is not None and nominal.evaluation.good:
-        for outcomes, _ in _worse(search, nominal.optimum, progress, ()):
-            for found in outcomes:
-                progress.add(found, math.nan)
-    basins, ended = _locals(search, _starts(search, nominal, progress.scenarios), progress.scenarios)
+    if progress.best is None:
+        first = dict(nominal.optimum) if nominal.optimum else _coarse(search.problem)[0]
+        for scenario in search.uncertain.middle():
+            progress.add(search.outcome(first, scenario), math.nan)
+        if nominal.evaluation is not None and nominal.evaluation.good:
+            for outcomes, _ in _worse(search, nominal.optimum, progress, ()):
+                for found in outcomes:
+                    progress.add(found, math.nan)
+    starts = _starts(search, nominal, progress, progress.scenarios)
+    basins, ended = _locals(search, starts, progress.scenarios)
     if ended is not None:
         return ended
     known = dict.fromkeys(range(len(basins)), len(progress.scenarios))
@@ -367,12 +369,12 @@ def sampled(
     The starts are judged, and improved, with a few of the samples first.
     """
     few = list(drawn[:FEW])
-    basins, ended = _locals(search, _starts(search, nominal, few), few)
+    basins, ended = _locals(search, _starts(search, nominal, progress, few), few)
     if ended is not None:
         return ended
     progress.cuts = [_cut(scenario) for scenario in drawn]
     best = min(basins, key=lambda basin: basin.standing)
-    starts = [best.evaluation.values] + ([dict(nominal.optimum)] if nominal.optimum else [])
+    starts = [best.evaluation.values, *([nominal.optimum] if nominal.optimum else [])]
     begin = min(
         (e for values in starts if (e := search.evaluation(values, drawn)).good),
         key=lambda evaluation: search.model(evaluation, len(drawn)).merit, default=None,
@@ -385,12 +387,13 @@ def sampled(
 
 
 def _starts(
-    search: RobustSearch, nominal: DesignResult, scenarios: Sequence[Scenario]
+    search: RobustSearch, nominal: DesignResult, progress: SearchProgress, scenarios: Sequence[Scenario]
 ) -> list[DesignEvaluation]:
-    """Return designs over the whole range, evaluated over some scenarios: a coarse stage of its own."""
-    given = [dict(basin.values) for basin in nominal.basins] + _coarse(search.problem)
-    if nominal.optimum:
-        given.insert(0, dict(nominal.optimum))
+    """Return designs over the whole range, or the best one known, evaluated over some scenarios."""
+    first = [dict(nominal.optimum)] if nominal.optimum else []
+    given = first + [dict(basin.values) for basin in nominal.basins] + _coarse(search.problem)
+    if progress.best is not None:
+        given = [dict(progress.best.evaluation.values)]
     search.ahead((values, scenario) for values in given for scenario in scenarios)
     seen = [search.evaluation(values, scenarios) for values in given]
     if nominal.optimum and not any(evaluation.good for evaluation in seen):
@@ -422,13 +425,10 @@ def _locals(
         z = [variable.inside(begin.values[variable.name]) for variable in search.variables]
         if len(places) < search.problem.basins and all(math.dist(z, other) > FAR_APART for other in places):
             places.append(z)
-            local = search.improve(begin.values, scenarios)
-            if local is None:
-                continue
-            end = scaled(search.variables, local.evaluation.values)
-            ends = [scaled(search.variables, other.evaluation.values) for other in found]
-            if all(math.dist(end, other) > SAME_PLACE for other in ends):
-                found.append(local)
+            if (local := search.improve(begin.values, scenarios)) is not None:
+                end, *ends = (scaled(search.variables, one.evaluation.values) for one in (local, *found))
+                if all(math.dist(end, other) > SAME_PLACE for other in ends):
+                    found.append(local)
     return found, None
 
 
