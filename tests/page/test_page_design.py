@@ -63,7 +63,7 @@ def test_two_variables_two_cases_and_a_limit(profile: Profile, site: Site) -> No
     assert {key: request[key] for key in keys} == keys
     direct = optim.design(solver.load_scene("two-dof"), **keys)  # type: ignore[arg-type]
     assert direct.peak is not None
-    expect(page.locator("#design-facts")).to_contain_text(f"{direct.optimum['damper.N0']:.5g} N")
+    expect(page.locator("#design-facts")).to_contain_text(f"{direct.optimum['damper.N0']:.4g} N")
     limits = page.get_by_role("region", name="Limits of the design").locator("tbody tr")
     expect(limits).to_have_count(2)
     expect(limits.first).to_contain_text("low0.35 Hz0.35 Hz")
@@ -149,6 +149,19 @@ def test_rows_are_added_and_removed_by_keyboard(profile: Profile, site: Site) ->
     expect(page.locator("#settings-wrong")).to_contain_text("30 < 20 is not so")
 
 
+def test_the_fields_of_a_problem_are_in_the_units_that_people_use(profile: Profile, site: Site) -> None:
+    page = visit(profile[0], site, "?scene=platform-wedge&tab=design")
+    fill(page, "variable 1", path="wedge.angle")
+    row = page.locator("[role=group][aria-label='variable 1']")
+    expect(row).to_contain_text("°")
+    fill(page, "variable 1", low="15", high="40")
+    expect(page.locator("#problem-words")).to_contain_text("wedge.angle (15 – 40 °)")
+    page.click("#problem-uncertainty-fold summary")
+    page.click("#problem-uncertain-add")
+    fill(page, "uncertain parameter 1", path="wedge.kt", how="± value", **{"from": "2"})
+    expect(page.locator("#problem-words")).to_contain_text("wedge.kt ± 2 value MN/m")
+
+
 @pytest.mark.long
 def test_from_nothing_to_a_compared_named_and_reported_design(profile: Profile, site: Site) -> None:
     """Two variables, three engine orders and a limit, in a project, beside a design without the limit."""
@@ -159,13 +172,14 @@ def test_from_nothing_to_a_compared_named_and_reported_design(profile: Profile, 
     expect(page.locator("#project-form")).to_be_hidden()
     fill(page, "variable 1", path="shroud.N0", low="100", high="400")
     page.click("#problem-variables-add")
-    fill(page, "variable 2", path="shroud.kt", low="4e6", high="8e6")
+    fill(page, "variable 2", path="shroud.kt", low="4", high="8")  # MN/m
     page.click("#problem-cases-fold summary")
     for number in (1, 2, 3):
         page.click("#problem-cases-add")
         fill(page, f"case {number}", name=f"order {number}", engine_order=str(number))
     page.click("#study")
     expect(page.locator("#design-status")).to_contain_text("Found in", timeout=LONG_MS)
+    assert asked(site, page)["variables"] == {"shroud.N0": [100, 400], "shroud.kt": [4e6, 8e6]}
     page.click("#problem-limits-fold summary")
     page.fill("#problem-max_band_hz", "120")
     page.click("#study")

@@ -2,8 +2,8 @@
 // a body as such rows: what they offer, and what they say as keys of the body.
 
 import { button, el, options as optionsOf, show } from "../base/dom.js";
-import { number, unitOf } from "../base/format.js";
-import { contactsOf, current, value, variables } from "../scene/scenes.js";
+import { number } from "../base/format.js";
+import { contactsOf, current, fieldUnit, inField, ofField, value, variables } from "../scene/scenes.js";
 import { hintOf, numberOf, readField, Unreadable, written } from "./fields.js";
 
 // `columns`: {name, label, type: "number" | "text" | "select" | "now", options, hint, off}; `told(row)` gives what stands
@@ -85,12 +85,12 @@ export function namesOfTable(key) {
   return [...new Set([...variables(), ...[...current.parameters.values()].filter(({ slider }) => slider).map(({ path }) => path)])];
 }
 
-// What a row says of its path; a path that was chosen anew brings bounds.
+// What a row says of its path, in the unit of its fields; a path that was chosen anew brings bounds.
 export function boundsTold(key, path, changed) {
   const known = current.parameters.get(path);
-  const now = { now: known ? number(value(path), 5) : "", unit: unitOf(path) };
+  const now = { now: !known ? "" : number(value(path) === null ? null : inField(path, value(path)), 5), unit: fieldUnit(path).name };
   const bounds = known && changed === "path" ? (key === "variables" ? known.bounds : known.around ?? known.bounds) : null;
-  return bounds ? { ...now, low: String(bounds[0]), high: String(bounds[1]) } : now;
+  return bounds ? { ...now, low: String(inField(path, bounds[0])), high: String(inField(path, bounds[1])) } : now;
 }
 
 const PAIR = /\[([^\],]+), ([^\],]+)\]/;
@@ -126,20 +126,21 @@ export function tableBody(rows, { main, beside }) {
   for (const row of rows) {
     const pointer = (key) => `/${key}/${row.path}`;
     if (row.path in body[main.key]) throw new Unreadable(pointer(main.key), `${row.path} stands there twice.`);
-    const pair = (field, before, all) => ends(field, before).map(({ name, label }) => numberOf(row[name], pointer(all), `${row.path}, ${label},`));
-    body[main.key][row.path] = pair(main, "", main.key);
+    const read = (field, name, label) => ofField(row.path, numberOf(row[name], pointer(field.key), `${row.path}, ${label},`));
+    const pair = (field, before) => ends(field, before).map(({ name, label }) => read(field, name, label));
+    body[main.key][row.path] = pair(main, "");
     for (const field of beside) {
-      const given = field.of.kind === "pair" ? ends(field, `${field.key}_`).some(({ name }) => row[name] !== undefined) && pair(field, `${field.key}_`, field.key)
-        : row[field.key] !== undefined && (field.of.kind === "number" ? numberOf(row[field.key], pointer(field.key), `${row.path}, ${field.label},`) : row[field.key] !== "auto" && row[field.key]);
+      const given = field.of.kind === "pair" ? ends(field, `${field.key}_`).some(({ name }) => row[name] !== undefined) && pair(field, `${field.key}_`)
+        : row[field.key] !== undefined && (field.of.kind === "number" ? read(field, field.key, field.label) : row[field.key] !== "auto" && row[field.key]);
       if (given || given === 0) (body[field.key] ??= {})[row.path] = given;
     }
   }
   return Object.keys(body[main.key]).length ? body : {};
 }
 
-export const rowsOfTable = ({ main, beside }, request) => Object.entries(request[main.key] ?? {}).map(([path, [low, high]]) => Object.assign({ path, low, high }, ...beside.map((field) => {
-  const value = request[field.key]?.[path];
-  return field.of.kind === "pair" && value ? { [`${field.key}_low`]: value[0], [`${field.key}_high`]: value[1] } : { [field.key]: value };
+export const rowsOfTable = ({ main, beside }, request) => Object.entries(request[main.key] ?? {}).map(([path, [low, high]]) => Object.assign({ path, low: inField(path, low), high: inField(path, high) }, ...beside.map((field) => {
+  const [value, end] = [request[field.key]?.[path]].flat().map((one) => (typeof one === "number" ? inField(path, one) : one));
+  return end === undefined ? { [field.key]: value } : { [`${field.key}_low`]: value, [`${field.key}_high`]: end };
 })));
 
 // The columns of a list of tables; of values by path those in `paths` have a column each.

@@ -2,14 +2,13 @@
 // it: intervals and deviations as rows, or what an identification gave, held as it is.
 
 import { button, byId, el, show } from "../base/dom.js";
-import { unitOf } from "../base/format.js";
 import { on, state } from "../base/state.js";
 import { numberOf, Unreadable } from "../forms/fields.js";
 import { schemaForm } from "../forms/form.js";
-import { boundsTold, namesOfTable, rowsOf } from "../forms/rows.js";
+import { boundsTold, namesOfTable, rowsOf, rowsOfTable } from "../forms/rows.js";
 import { run } from "../network/jobs.js";
 import { askedFor } from "../scene/kinds.js";
-import { chooseVariable, defaultRange, variable, variables } from "../scene/scenes.js";
+import { chooseVariable, defaultRange, fieldUnit, inField, ofField, variable, variables } from "../scene/scenes.js";
 import { fillSettings, readSettings } from "../scene/settings.js";
 import { design } from "./design.js";
 import { complaining, formPart, view } from "./view.js";
@@ -46,7 +45,7 @@ export const problem = view({
   scene: () => fill({}),
 });
 
-const ownVariable = () => (variable() ? [{ path: variable(), low: (state.range ?? defaultRange())[0], high: (state.range ?? defaultRange())[1] }] : []);
+const ownVariable = () => (variable() ? rowsOfTable({ main: { key: "variables" }, beside: [] }, { variables: { [variable()]: state.range ?? defaultRange() } }) : []);
 
 function fillVariables({ variables: given }) {
   if (!given) form.rows("variables").fill(ownVariable());
@@ -80,7 +79,7 @@ function inWords() {
     const part = byId(`problem-${key}`);
     (part?.matches("input, select") ? part : part?.querySelector("input, select") ?? byId(`problem-${key}-add`))?.focus();
   } }, words);
-  const over = form.rows("variables").read().map(({ path, low, high }) => link(`${path} (${low ?? "…"} – ${high ?? "…"}${unitOf(path) ? ` ${unitOf(path)}` : ""})`, "variables"));
+  const over = form.rows("variables").read().map(({ path, low, high }) => link(`${path} (${`${low ?? "…"} – ${high ?? "…"} ${fieldUnit(path).name}`.trim()})`, "variables"));
   const limits = limitWords(body).map(([words, key]) => link(words, key, "limits"));
   const open = uncertain.words();
   const cases = body.cases?.length ?? 0;
@@ -106,16 +105,15 @@ const joined = (nodes) => nodes.flatMap((node, i) => (i === 0 ? [node] : [i === 
 const HOW = { "± share": "deviation", "± value": "absolute_deviation" };
 
 function intervalOf({ path, how, from, to }) {
-  const pointer = `/uncertain/${path}`;
-  const first = numberOf(from, pointer, `${path}, from or ±,`);
-  const both = () => [first, numberOf(to, pointer, `${path}, to,`)];
-  return how === "between" ? both() : { [HOW[how]]: to === undefined ? first : both() };
+  const read = (text, label) => (how === "± share" ? (_, share) => share : ofField)(path, numberOf(text, `/uncertain/${path}`, `${path}, ${label},`));
+  const ends = [read(from, "from or ±"), ...(how === "between" || to !== undefined ? [read(to, "to")] : [])];
+  return how === "between" ? ends : { [HOW[how]]: ends.length > 1 ? ends : ends[0] };
 }
 
 function rowOf([path, how]) {
-  if (Array.isArray(how)) return { path, how: "between", from: how[0], to: how[1] };
-  const [word, ends] = "deviation" in how ? ["± share", how.deviation] : ["± value", how.absolute_deviation];
-  return Array.isArray(ends) ? { path, how: word, from: ends[0], to: ends[1] } : { path, how: word, from: ends };
+  const [word, ends] = Array.isArray(how) ? ["between", how] : "deviation" in how ? ["± share", how.deviation] : ["± value", how.absolute_deviation];
+  const [from, to] = [ends].flat().map((end) => (word === "± share" ? end : inField(path, end)));
+  return { path, how: word, from, ...(Array.isArray(ends) ? { to } : {}) };
 }
 
 const isListed = (uncertain) => uncertain && !Array.isArray(uncertain) && Object.values(uncertain).every((how) => Array.isArray(how) || "deviation" in Object(how) || "absolute_deviation" in Object(how));
@@ -158,6 +156,6 @@ function uncertainPart(id) {
       rows.fill([]);
       hold(found);
     },
-    words: () => (given ? [given.words] : rows.read().map(({ path, how, from, to }) => `${path} ${how === "between" ? `in ${from ?? "…"} – ${to ?? "…"}` : `${how.replace("±", `± ${from ?? "…"}`)}`}`)),
+    words: () => (given ? [given.words] : rows.read().map(({ path, how, from, to }) => `${path} ${how === "between" ? `in ${from ?? "…"} – ${to ?? "…"}` : `${how.replace("±", `± ${from ?? "…"}`)}`} ${how === "± share" ? "" : fieldUnit(path).name}`.trim())),
   };
 }
