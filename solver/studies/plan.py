@@ -21,9 +21,7 @@ from solver.response.plausibility import plausibility
 from solver.response.stability.cost import forecast
 from solver.results import units
 from solver.scene.cyclic.annulus import sectors_needed
-from solver.scene.scene import (
-    Scene,
-)
+from solver.scene.scene import Scene
 from solver.scene.scene_harmonics import even_harmonics_reason
 from solver.scene.scene_records import MatricesStructure
 from solver.studies.memory import dense_bytes

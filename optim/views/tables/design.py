@@ -75,10 +75,7 @@ def _designs(title: str, found: Sequence[Json], columns: Mapping[str, Callable[[
     """A table of designs: their variables, then what is told of each."""
     names = tuple(found[0]["values"]) if found else ()
     rows = [
-        (
-            *(parameter(name, one["values"][name]) for name in names),
-            *(show(one) for show in columns.values()),
-        )
+        (*(parameter(name, one["values"][name]) for name in names), *(show(one) for show in columns.values()))
         for one in found
     ]
     return ResultTable(title, (*names, *columns), rows)

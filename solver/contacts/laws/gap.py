@@ -89,9 +89,7 @@ class GapSpring(AnyContact):
 
     def rows(self) -> tuple[Row, ...]:
         """Return its row of the time march."""
-        return (
-            Row(name=self.name, follows=Follows.GAP, kt=self.k, gap=self.gap),
-        )  # fmt: skip
+        return (Row(name=self.name, follows=Follows.GAP, kt=self.k, gap=self.gap),)
 
 
 LAW = GapSpring

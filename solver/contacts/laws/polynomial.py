@@ -125,12 +125,7 @@ class PolynomialSpring(AnyContact):
     def rows(self) -> tuple[Row, ...]:
         """Return its row of the time march."""
         powers = self.coefficients
-        return (
-            Row(
-                name=self.name, follows=Follows.POLYNOMIAL, kt=abs(powers[0]),
-                powers=powers,
-            ),
-        )  # fmt: skip
+        return (Row(name=self.name, follows=Follows.POLYNOMIAL, kt=abs(powers[0]), powers=powers),)
 
 
 LAW = PolynomialSpring

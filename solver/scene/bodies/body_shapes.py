@@ -379,10 +379,7 @@ class Shroud(_Faced):
         return {"prestressed": True}
 
 
-AnyShape = Annotated[
-    Wedge | Cylinder | Asymmetric | SplitRing | Shroud | Patch,
-    Field(discriminator="shape"),
-]
+AnyShape = Annotated[Wedge | Cylinder | Asymmetric | SplitRing | Shroud | Patch, Field(discriminator="shape")]
 SHAPES: dict[str, type[Shape]] = {
     each.SHAPE: each for each in (Wedge, Cylinder, Asymmetric, SplitRing, Shroud, Patch)
 }
