@@ -193,6 +193,7 @@ def _run(
     # What is minimised over the uncertainty has the measure and the harmonics that the nominal optimum needs,
     # and more of these where the worst scenario needs them.
     most, posed = most_harmonics(search.problem.harmonics), state.nominal.problem
+    search.most_harmonics = most
     search.problem = replace(search.problem, harmonics=posed.harmonics, cases=posed.cases)
     status = _ended(search, drawn, state)
     while status is RobustStatus.NOT_KNOWN and 2 * search.problem.harmonics <= most:
@@ -201,8 +202,10 @@ def _run(
         earlier, again = search.problem, _State(nominal=state.nominal, progress=begun)
         search.problem = replace(earlier, harmonics=2 * earlier.harmonics)
         status = _ended(search, drawn, again)
-        if "robust" not in again.sides:
-            search.problem, state.unknown = earlier, again.unknown
+        if status is not RobustStatus.NOT_KNOWN and "robust" not in again.sides:
+            search.problem, search.most_harmonics = earlier, 0
+            _ended(search, drawn, state)
+            state.unknown = again.unknown
             break
         state = again
     best = state.progress.best
@@ -235,6 +238,8 @@ def _search(search: RobustSearch, drawn: tuple[Scenario, ...], state: _State) ->
         return RobustStatus.STOPPED
     method = cutting_sets if search.aim is Aim.WORST_CASE else sampled
     status = method(search, state.nominal, drawn, state.progress)
+    if status is RobustStatus.NOT_KNOWN:
+        return status
     known = [] if state.progress.best is None else state.progress.scenarios
     if state.nominal.evaluation is not None and state.nominal.evaluation.good:
         state.sides["nominal"] = side_of(search, state.nominal.optimum, drawn, known)

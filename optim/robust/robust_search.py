@@ -21,10 +21,11 @@ from optim.problem.design_problem import Problem
 from optim.problem.uncertainty_set import Scenario, UncertainSet
 from optim.problem.variables import BoundedVariable, scaled, unscaled
 from optim.results.design_result import NOMINAL, SAME_PLACE, BestSoFar, DesignResult, DesignStatus, OnBest
+from optim.results.doubts import WELL_KNOWN
 from optim.robust.robust_result import Cut, RobustStatus
 from optim.robust.scenarios import Outcome, aim_model, known_in, number_of, outcome, together
 from optim.robust.worst_case import MOST_BESIDES, Aspect, Finding, UnknownScenarioError, pessimise
-from solver.results.known import Known
+from solver.results.known import Known, worst_of
 from solver.results.spread import Ahead
 
 MOST_RESPONSES = 20_000
@@ -57,6 +58,7 @@ class RobustSearch:
             None  # over what, standing of the best
         )
         self._scale = 0.0
+        self.most_harmonics = 0  # up to which a doubtful design is looked for again with twice as many
 
     @property
     def variables(self) -> tuple[BoundedVariable, ...]:
@@ -134,6 +136,14 @@ class RobustSearch:
         found = known_in(self.problem, values, scenario, self._should_stop)
         self.count(len(self.problem.cases))
         return found
+
+    def needs_more_harmonics(self, best: Local, scenarios: Sequence[Scenario]) -> bool:
+        """Return whether a design has to be looked for again with twice the harmonics, and can be."""
+        if 2 * self.problem.harmonics > self.most_harmonics or _ended(best) is not RobustStatus.OPTIMAL:
+            return False
+        worst = [scenarios[number_of(row) - 1] for row in best.evaluation.peaks[:1]]
+        parts = [self.known(best.evaluation.values, one) for one in dict.fromkeys((Scenario(), *worst))]
+        return best.evaluation.open or not worst_of(parts).relative <= WELL_KNOWN
 
     def count(self, responses: int) -> None:
         """Count responses and report them."""
@@ -312,8 +322,14 @@ def cutting_sets(
             if min(basin.standing for basin in basins) < basins[place].standing:
                 continue
         progress.best = basins[place]
-        worse = _worse(search, basins[place].evaluation.values, progress, drawn)
-        progress.gap = max((gap for _, gap in worse), default=math.nan)
+        # What has too few harmonics only ranks designs: over the whole set it is not looked at.
+        for looked in ((), drawn):
+            worse = _worse(search, basins[place].evaluation.values, progress, looked)
+            progress.gap = max((gap for _, gap in worse), default=math.nan)
+            if progress.gap > CLOSED:
+                break
+            if not looked and search.needs_more_harmonics(basins[place], progress.scenarios):
+                return RobustStatus.NOT_KNOWN
         if progress.gap <= CLOSED:
             ended = _ended(basins[place])
             open_look = ended is RobustStatus.OPTIMAL and not progress.finished
@@ -373,7 +389,9 @@ def sampled(
     if ended is not None:
         return ended
     progress.cuts = [_cut(scenario) for scenario in drawn]
-    best = min(basins, key=lambda basin: basin.standing)
+    progress.best = best = min(basins, key=lambda basin: basin.standing)
+    if search.needs_more_harmonics(best, few):
+        return RobustStatus.NOT_KNOWN
     starts = [best.evaluation.values, *([nominal.optimum] if nominal.optimum else [])]
     begin = min(
         (e for values in starts if (e := search.evaluation(values, drawn)).good),

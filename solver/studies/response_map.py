@@ -37,19 +37,10 @@ _SAME = 1e-6  # relative distance within which two solutions are one
 
 @shows_progress("map")
 def response_map(
-    scene: Scene,
-    parameter: str,
-    start: float,
-    stop: float,
-    *,
-    steps: int = 60,
-    frequencies: int = 400,
-    harmonics: int = 11,
-    ridge: bool = True,
-    effects: Effects | None = None,
-    on_progress: Callable[[float, int], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-) -> ResponseMap:
+    scene: Scene, parameter: str, start: float, stop: float, *, steps: int = 60, frequencies: int = 400,
+    harmonics: int = 11, ridge: bool = True, effects: Effects | None = None,
+    on_progress: Callable[[float, int], None] | None = None, should_stop: Callable[[], bool] | None = None,
+) -> ResponseMap:  # fmt: skip
     """Solve the response on a grid over the scene's band and the range of one parameter.
 
     Parameters
@@ -209,17 +200,9 @@ class MapGrid:
 
 
 def map_grid(
-    scene: Scene,
-    parameter: str,
-    start: float,
-    stop: float,
-    *,
-    steps: int = 60,
-    frequencies: int = 400,
-    harmonics: int = 11,
-    ridge: bool = True,
-    effects: Effects | None = None,
-) -> MapGrid:
+    scene: Scene, parameter: str, start: float, stop: float, *, steps: int = 60, frequencies: int = 400,
+    harmonics: int = 11, ridge: bool = True, effects: Effects | None = None,
+) -> MapGrid:  # fmt: skip
     """Return the points of `response_map`, to be solved in strips on several processors; errors as there."""
     for name, value in (("steps", steps), ("frequencies", frequencies)):
         check_count(name, value, 2)
@@ -259,10 +242,10 @@ def _row(
             solutions[at], known[at] = found.u, GIVEN
         else:
             at += 1
-    for at in np.flatnonzero((known[:-1] != SOLVED) & (known[1:] == SOLVED)):
-        solutions[at], known[at] = solutions[at + 1], GIVEN  # some only the next one leads to
+    for hole in np.flatnonzero((known[:-1] != SOLVED) & (known[1:] == SOLVED)).tolist():
+        solutions[hole], known[hole] = solutions[hole + 1], GIVEN  # some only the next one leads to
         spent += solve_row(
-            workspace.system, workspace.linear, workspace.point, omegas[: at + 1], at, *before, solutions,
+            workspace.system, workspace.linear, workspace.point, omegas[: hole + 1], hole, *before, solutions,
             known, values,
         )[1]  # fmt: skip
     known[known != SOLVED] = 0
