@@ -149,12 +149,13 @@ class Question(NamedTuple):
 
 
 class Proposed(NamedTuple):
-    """Keys of a body that a scene suggests: which of them it does not say itself but are assumed, and those
-    that are a share of the highest peak of its response."""
+    """Keys of a body that a scene suggests: which of them it does not say itself but are assumed, those that
+    are a share of the highest peak of its response, and how often it takes the points of the question."""
 
     body: Json = MappingProxyType({})
     assumed: Sequence[str] = ()
     of_peak: Mapping[str, float] = MappingProxyType({})
+    times: int = 1
 
 
 class Study(SceneRequest):

@@ -45,9 +45,6 @@ def proposals(scene: Scene) -> list[StudyProposal]:
     for study in (study_named(name) for name in there()):
         told, asks = study.propose(scene), study.ASKS
         proposed = Proposed() if isinstance(told, str) else told
-        points = asks.points
-        if points is not None and "orders" in proposed.body:
-            points *= len(proposed.body["orders"])
         found.append(
             StudyProposal(
                 kind=study.NAME,
@@ -56,7 +53,7 @@ def proposals(scene: Scene) -> list[StudyProposal]:
                 body=dict(proposed.body),
                 assumed=list(proposed.assumed),
                 of_peak=dict(proposed.of_peak),
-                points=points,
+                points=None if asks.points is None else asks.points * proposed.times,
                 refused=told if isinstance(told, str) else None,
             )
         )

@@ -68,7 +68,8 @@ class Campbell(Study, HarmonicRequest):
         most = max(scene.structure.sector_count // 2, first) if scene.structure.has_sectors else _ORDERS
         orders = [order for order in range(first, first + _ORDERS) if order <= max(most, first)]
         speeds = [rounded(60.0 * low / orders[-1], 4), rounded(60.0 * high / first, 4)]
-        return Proposed({"speeds_rpm": [speeds], "orders": orders, "band_hz": [low, high]}, ("orders",))
+        body = {"speeds_rpm": [speeds], "orders": orders, "band_hz": [low, high]}
+        return Proposed(body, ("orders",), times=len(orders))
 
     def issues(self, _scene: Scene) -> list[Issue]:
         """Return what is wrong with speeds and band."""

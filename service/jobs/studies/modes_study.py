@@ -151,7 +151,7 @@ class Modes(Study, HarmonicRequest):
 
     EXAMPLES = ({"scene": "two-dof", "mode": 1, "from": 0.01, "to": 100},)
     NAME, FUNCTION, RESULT = "modes", "solver:nonlinear_mode", modes_result
-    ASKS = Question("How do frequency and damping change with amplitude?", "rig", 4_000)
+    ASKS = Question("How do frequency and damping change with amplitude?", "rig", 10_000)
     TOLD = "solver.views.tables.disks:mode"
     SHOWS = "frequency and damping ratio over the amplitude ([modes](modes.md))"
     EMPTY = ("amplitude", "no point of the mode was found")

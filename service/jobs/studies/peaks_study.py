@@ -42,7 +42,7 @@ class Peaks(RangeRequest):
 
     EXAMPLES = ({"scene": "bladed-disk", "parameter": DISK_LOAD, "from": 20, "to": 3000},)
     NAME, FUNCTION, RESULT = "peaks", "solver:track_peak", peaks_result
-    ASKS = Question("How does the peak follow the damper?", "damper", 12_000)
+    ASKS = Question("How does the peak follow the damper?", "damper", 25_000)
     TOLD = "solver.views.tables.tracks:track"
     SHOWS = "the highest peak over the parameter, where it is least ([peaks](peaks.md))"
     FIGURE, EMPTY = "solver.views.plots.tracks:track_figure", ("parameter", "no peak was tracked")
