@@ -91,8 +91,12 @@ def dense_bytes(scene: Scene, harmonics: int, *, every_sector: bool = False) -> 
 
 def march_bytes(scene: Scene) -> int:
     """Return the memory that time marching takes, of all sectors [bytes]."""
-    n = _dofs(scene) * _sectors(scene, every_sector=True)
-    return _OF_A_MARCH * _REAL * n**2
+    return _OF_A_MARCH * _REAL * whole_coordinates(scene) ** 2
+
+
+def whole_coordinates(scene: Scene) -> int:
+    """Return the coordinates that all sectors have."""
+    return _dofs(scene) * _sectors(scene, every_sector=True)
 
 
 def _sectors(scene: Scene, every_sector: bool) -> int:

@@ -24,6 +24,8 @@ QUICK_DOFS = 500
 """Of the whole disk: of so many it is quickly known how fast they move."""
 FEWEST_STEPS = 256
 """Of a period, where the solver chooses them."""
+MOST_COUPLED = 250
+"""Motions of full matrices; with more a march of a hundred periods takes more than half an hour."""
 MOST_MOTIONS = 40
 """Points of the curve of a mode with loops and shapes."""
 POINTS_OF_A_SWEEP = 20
@@ -174,6 +176,16 @@ def march_issues(
     key = of_periods if steps_per_period is None else "steps_per_period"
     words = "steps of a period × periods × DOFs"
     return [Issue((key,), f"`{key}`: {words} must be at most {MOST_STEPS}", steps, named=False)]
+
+
+def marched_for_hours(scene: Scene) -> str:
+    """Return why a march of the scene is not proposed; empty where it takes minutes at most."""
+    from solver.studies.memory import whole_coordinates
+
+    count = whole_coordinates(scene) if scene.structure.kind == "matrices" else 0
+    if count <= MOST_COUPLED:
+        return ""
+    return f"A march takes hours here: each of its steps couples all {count} motions of the matrices."
 
 
 def is_quick(scene: Scene) -> bool:

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from service.jobs.common.result_models import Table, answered
 from service.jobs.common.scene_requests import FrequencyHz, check
-from service.jobs.common.sizes import is_quick, march_issues
+from service.jobs.common.sizes import is_quick, march_issues, marched_for_hours
 from service.jobs.common.study_keys import of_keys
 from service.jobs.kind_registry import Flag
 from service.jobs.study import Answer, Proposed, Question, Study, Watch, middle_hz
@@ -61,7 +61,7 @@ class March(Study):
     @classmethod
     def propose(cls, scene: Scene) -> Proposed | str:
         """The middle of the band."""
-        return Proposed({"frequency_hz": middle_hz(scene)})
+        return marched_for_hours(scene) or Proposed({"frequency_hz": middle_hz(scene)})
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from service.jobs.common.result_models import answered
 from service.jobs.common.scene_requests import NotNegative, PositiveNumber, check
-from service.jobs.common.sizes import is_quick, march_issues
+from service.jobs.common.sizes import is_quick, march_issues, marched_for_hours
 from service.jobs.common.study_keys import of_keys
 from service.jobs.kind_registry import Flag
 from service.jobs.study import Proposed, Question, Study, middle_hz, rounded
@@ -73,9 +73,8 @@ class Transient(Study):
         """Through the band in some hundred periods: how fast, the scene does not say."""
         (low, high), middle = scene.observe.band, middle_hz(scene)
         rate = rounded((high - low) * middle / _PERIODS, 2)
-        return Proposed(
-            {"begin_hz": float(low), "end_hz": float(high), "rate_hz_per_s": rate}, ("rate_hz_per_s",)
-        )
+        body = {"begin_hz": float(low), "end_hz": float(high), "rate_hz_per_s": rate}
+        return marched_for_hours(scene) or Proposed(body, ("rate_hz_per_s",))
 
     @classmethod
     def lacks(cls, given: Collection[str]) -> bool:

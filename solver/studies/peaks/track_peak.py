@@ -32,17 +32,10 @@ NARROW = 1.0 / 64.0  # share of the range: sweeps closer than that are not halve
 
 @shows_progress("peaks")
 def track_peak(
-    scene: Scene,
-    parameter: str,
-    start: float,
-    stop: float,
-    *,
-    harmonics: int = 11,
-    checks: int = 3,
-    effects: Effects | None = None,
-    on_progress: Callable[[float, int], None] | None = None,
+    scene: Scene, parameter: str, start: float, stop: float, *, harmonics: int = 11, checks: int = 3,
+    effects: Effects | None = None, on_progress: Callable[[float, int], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
-) -> PeakTrack:
+) -> PeakTrack:  # fmt: skip
     """Follow the highest peak over the scene's band while a parameter changes.
 
     Parameters
