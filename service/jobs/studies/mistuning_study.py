@@ -85,7 +85,10 @@ def blades_differ(scene: Scene) -> Proposed | str:
     if not scene.structure.has_sectors:
         return NO_SECTORS
     wrong = part_issues(lambda: disk_factors(scene, [scene.observe.dof], 0.0, 1, 1))
-    return wrong[0].message if wrong else Proposed({"of": [scene.observe.dof]}, ("of",))
+    if wrong:
+        words = wrong[0].message.removeprefix("`of`: ")
+        return f"{words[:1].upper()}{words[1:]}."
+    return Proposed({"of": [scene.observe.dof]}, ("of",))
 
 
 mistuning_result = answered(
