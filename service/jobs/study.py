@@ -216,7 +216,8 @@ class Study(SceneRequest):
             return dict(given)
         found = cls.propose(scene)
         if isinstance(found, str):
-            raise SettingError("scene", scene.name, f"is not for `{cls.NAME}`: {found}")
+            why = f"{found[:1].lower()}{found[1:-1]}"
+            raise SettingError("scene", scene.name, f"is not for `{cls.NAME}`: {why}")
         names = {field.alias or name: name for name, field in cls.model_fields.items()}
         body = {names[key]: value for key, value in found.body.items()}
         body.update(given)

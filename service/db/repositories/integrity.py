@@ -194,9 +194,7 @@ def check(url: str, arrays: str | None = None) -> Findings:
             trouble = [*damage(connection), *contradictions(connection)]
             held = contents(connection)
             trouble += [] if store is None else unneeded(connection, store)
-        damaged = [
-            *damaged_arrays(engine, store), *damaged_results(engine), *damaged_uploads(engine, url),
-        ]  # fmt: skip
+        damaged = [*damaged_arrays(engine, store), *damaged_results(engine), *damaged_uploads(engine, url)]
     except DBAPIError as error:
         raise DamagedDatabaseError(f"{name} cannot be read: {error.orig}") from error
     finally:

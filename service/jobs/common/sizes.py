@@ -185,7 +185,7 @@ def marched_for_hours(scene: Scene) -> str:
     count = whole_coordinates(scene) if scene.structure.kind == "matrices" else 0
     if count <= MOST_COUPLED:
         return ""
-    return f"A march takes hours here: each of its steps couples all {count} motions of the matrices."
+    return f"Each step couples all {count} motions of the matrices: a march takes hours, and wants its keys."
 
 
 def is_quick(scene: Scene) -> bool:

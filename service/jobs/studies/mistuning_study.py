@@ -86,15 +86,13 @@ def blades_differ(scene: Scene) -> Proposed | str:
         return NO_SECTORS
     wrong = part_issues(lambda: disk_factors(scene, [scene.observe.dof], 0.0, 1, 1))
     if wrong:
-        words = wrong[0].message.removeprefix("`of`: ")
-        return f"{words[:1].upper()}{words[1:]}."
+        return f"Nothing tells its blades apart: {wrong[0].message.removeprefix('`of`: ')}."
     return Proposed({"of": [scene.observe.dof]}, ("of",))
 
 
 mistuning_result = answered(
     "solver.studies.study_results:MistuningStudy", "MistuningResult", dof=str, samples=list[Table],
-    quantiles=list[Table],
-    worst=Table | None,
+    quantiles=list[Table], worst=Table | None,
 )  # fmt: skip
 
 

@@ -85,4 +85,4 @@ def test_what_is_left_out_is_what_the_scene_suggests(
 
 def test_a_study_that_a_scene_has_nothing_for_says_why(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["mistuning", "two-dof"]) == 2
-    assert "is not for `mistuning`: The scene is one blade" in capsys.readouterr().err
+    assert "is not for `mistuning`: the scene is one blade" in capsys.readouterr().err
