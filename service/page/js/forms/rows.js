@@ -90,7 +90,7 @@ export function boundsTold(key, path, changed) {
   const known = current.parameters.get(path);
   const now = { now: !known ? "" : number(value(path) === null ? null : inField(path, value(path)), 5), unit: fieldUnit(path).name };
   const bounds = known && changed === "path" ? (key === "variables" ? known.bounds : known.around ?? known.bounds) : null;
-  return bounds ? { ...now, low: String(inField(path, bounds[0])), high: String(inField(path, bounds[1])) } : now;
+  return bounds ? { ...now, low: String(inField(path, bounds[0], 3)), high: String(inField(path, bounds[1], 3)) } : now;
 }
 
 const PAIR = /\[([^\],]+), ([^\],]+)\]/;

@@ -81,4 +81,4 @@ export function chooseVariable(path) {
 
 // What a request about this scene says.
 export const asked = () => ({ scene: state.scene, set: { ...state.set }, harmonics: state.harmonics });
-export const defaultRange = () => current.parameters.get(variable()).bounds;
+export const defaultRange = () => current.parameters.get(variable()).bounds.map((end) => ofField(variable(), inField(variable(), end, 3)));
