@@ -88,8 +88,8 @@ def steps(day: str) -> dict[str, Callable[[], Any]]:
         "free: no load": swept(FREE),
         "stuck: 100 kN": swept(STUCK),
         "design with report": lambda: command("design", path, "--variable", *between, "--report", report),
-        "robust, mu 0.2 to 0.4": lambda: optim.robust_design(
-            scene, variables={LOAD: RANGE}, uncertain={"plat.mu": (0.2, 0.4)}, harmonics=HARMONICS
+        "robust, mu 0.25 to 0.35": lambda: optim.robust_design(
+            scene, variables={LOAD: RANGE}, uncertain={"plat.mu": (0.25, 0.35)}, harmonics=HARMONICS
         ),
         "margin": lambda: command(
             "margin", path, "--from", 1, "--to", 4, "--points", 3, "--limit", 0.01, "--harmonics", HARMONICS

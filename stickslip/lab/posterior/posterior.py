@@ -138,6 +138,10 @@ def _drawn(target: Target, mode: Real, covariance: Real, sampling: Sampling) -> 
     chains = nuts(rounded, begin, max(draws // CHAINS, int(ENOUGH) // 2), _WARM, rng)
     x = (mode + chains.x.reshape(-1, mode.size) @ root.T)[rng.permutation(chains.x.size // mode.size)]
     about = importance(target.log, x.mean(axis=0), np.atleast_2d(np.cov(x.T)), draws, rng)
+    if not chains.agree and sampler == "auto" and _trusted(about):
+        # Too few draws of the chains tell well enough where the density is to weigh others by it.
+        x = about.drawn(draws, rng)
+        return _Sampled(x=x, weighted=about, sampler="importance", effective=about.effective)
     return _Sampled(
         x=x if chains.agree else x[:0], weighted=about, sampler="nuts", r_hat=chains.r_hat,
         effective=chains.effective,
