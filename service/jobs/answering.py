@@ -194,9 +194,7 @@ def runs(jobs: Registry, previews: Registry) -> dict[str, RunOn]:
     """The functions of the processes, by the names of the tasks."""
     tasks: dict[str, Answer] = {
         PLAN: _plan, READ: _read, TEXT: _text, EDIT: _edit, STORE: _store, MEASURED: _measured, LOOK: _look,
-        PARAMETERS: _parameters,
-        RESOLVE: _Resolving.of(jobs),
-        PREVIEW: _Resolving.of(previews),
+        PARAMETERS: _parameters, RESOLVE: _Resolving.of(jobs), PREVIEW: _Resolving.of(previews),
     }  # fmt: skip
     return {name: Answering(task) for name, task in tasks.items()}
 

@@ -253,8 +253,7 @@ ROW = [item.name for item in fields(JobRow)]
 NEW_COLUMNS = [item.name for item in fields(NewJob) if item.name not in ("fresh", "words")]
 INITIAL: dict[str, Any] = {
     "state": JobState.ACCEPTED, "attempt": 0, "cancel_requested": False, "progress": 0.0, "points": 0,
-    "best": None,
-    "started": None, "finished": None, "result_of": None, "error": None,
+    "best": None, "started": None, "finished": None, "result_of": None, "error": None,
 }  # fmt: skip
 """What a job begins with."""
 

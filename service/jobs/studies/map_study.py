@@ -65,11 +65,12 @@ class Map(RangeRequest):
 
     @classmethod
     def propose(cls, scene: Scene) -> Proposed | str:
-        """Ridges are tracked where the law of every contact lets them be."""
+        """Ridges are tracked where the law of every contact lets them be, and no damper lifts off."""
         told = super().propose(scene)
         if isinstance(told, str):
             return told
-        return Proposed({**told.body, "ridge": not law_issues("ridge", scene)})
+        loose = told.body["parameter"].endswith(".mass")
+        return Proposed({**told.body, "ridge": not (loose or law_issues("ridge", scene))})
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""

@@ -57,8 +57,10 @@ class Peaks(RangeRequest):
     @classmethod
     def propose(cls, scene: Scene) -> Proposed | str:
         """Return the range of what is designed by itself, where peaks can be tracked."""
-        wrong = law_issues("scene", scene)
-        return wrong[0].said() if wrong else super().propose(scene)
+        wrong, told = law_issues("scene", scene), super().propose(scene)
+        if not isinstance(told, str) and told.body["parameter"].endswith(".mass"):
+            return "Peaks of a damper that lifts off fold, and are not followed with certainty: take the map."
+        return wrong[0].said() if wrong else told
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with the range and the laws of the contacts."""
