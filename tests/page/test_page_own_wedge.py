@@ -12,7 +12,7 @@ from page_site import Site, Watch
 expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
 
 if TYPE_CHECKING:
-    from playwright.sync_api import BrowserContext, Page
+    from playwright.sync_api import BrowserContext, Page, Route
 
 Profile = tuple["BrowserContext", Watch]
 FILE = Path(__file__).with_name("own_wedge.toml")
@@ -44,6 +44,24 @@ def test_a_strangers_wedge_is_answered_on_a_wider_range_in_few_presses(profile: 
     expect(page.locator("#answer-peak .large")).to_be_visible(timeout=LONG_MS)
     assert float(page.input_value("#high")) == pytest.approx(10.0 * float(before))
     assert page.evaluate("window.presses") <= MOST_PRESSES
+
+
+def test_a_form_is_not_used_before_its_scene_was_read(profile: Profile, site: Site) -> None:
+    """The button is pressed while the pane for text still loads: the press waits, and is not lost."""
+    page = first_screen(profile[0], site)
+
+    def slowly(route: Route) -> None:
+        page.wait_for_timeout(1500)
+        route.continue_()
+
+    page.route("**/codemirror*", slowly)
+    with page.expect_file_chooser() as chosen:
+        page.click("#first-open")
+    chosen.value.set_files(FILE)
+    page.locator("#editor-form").wait_for(state="attached")
+    assert page.locator("#editor-form").evaluate("form => form.inert")
+    page.get_by_role("button", name="Use this scene", include_hidden=True).click()
+    expect(page.locator("#scene")).to_have_value("own-wedge")
 
 
 def tab_to(page: Page, selector: str, most: int = 300) -> None:

@@ -52,7 +52,8 @@ async function begin(given, from = "edit-scene") {
   forgetOpened();
   await build();
   say("editor-status", "The scene is being read …");
-  await doc.open(given);
+  // Before it was read nothing in it can be used.
+  await doc.open(given).finally(() => { byId("editor-form").inert = false; });
   const first = byId("editor").querySelector("[aria-invalid]") ?? (doc.unreadable ? pane : byId("editor").querySelector("input"));
   first?.focus();
   byId("editor").scrollIntoView({ block: "start" });
@@ -68,7 +69,7 @@ async function build() {
   panel.hidden = false;
   const tables = el("div", { id: "editor-tables" });
   const text = el("div", { class: "toml-pane" });
-  const form = el("form", { novalidate: true, id: "editor-form" },
+  const form = el("form", { novalidate: true, id: "editor-form", inert: true },
     el("div", { class: "editor-bar" },
       el("button", { type: "submit", class: "main-button" }, "Use this scene"),
       button("Undo", () => step("undo"), { id: "editor-undo", title: "Undo (Ctrl+Z)" }),
