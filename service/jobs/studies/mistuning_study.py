@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
 _MOST_SAMPLES = 10_000
-_DEAR_FROM = 24  # contacts of a disk, from which one takes a minute
+DEAR_FROM = 24  # contacts of a disk, from which one takes a minute
 _MOST_NAMES = 100
 _WORK_OF_A_PART = 4  # sectors × harmonics: 0.1 s, measured on bladed-disk
 _MOST_DIVIDED = 256
@@ -142,7 +142,7 @@ class Mistuning(Study, HarmonicRequest):
         told, sectors = blades_differ(scene), scene.structure.sector_count
         if isinstance(told, str):
             return told
-        few = {"samples": 20, "harmonics": 3} if sectors * len(scene.contacts) > _DEAR_FROM else {}
+        few = {"samples": 20, "harmonics": 3} if sectors * len(scene.contacts) > DEAR_FROM else {}
         return told._replace(body={**told.body, **few}, times=few.get("samples", 100) * sectors)
 
     def issues(self, scene: Scene) -> list[Issue]:
