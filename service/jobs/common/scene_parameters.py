@@ -249,9 +249,8 @@ def _described(scene: Scene, path: str, part: object, name: str) -> SceneParamet
     if slider is not None:
         bounds = design_bounds(value, slider.low, slider.high, logarithmic=slider.logarithmic)
     return SceneParameterAnswer(
-        path=path, part=owner or path, name=name,
-        symbol=(quantity.symbol if quantity else "") or name, unit=found.unit,
-        words=(field.description if field else None) or "", value=value,
+        path=path, part=owner or path, name=name, symbol=(quantity.symbol if quantity else "") or name,
+        unit=found.unit, words=(field.description if field else None) or "", value=value,
         otherwise=None if otherwise is None else [f"{owner}.{other}" for other in otherwise],
         slider=slider, bounds=bounds, around=around(value) if value else None,
     )  # fmt: skip

@@ -65,12 +65,13 @@ class Map(RangeRequest):
 
     @classmethod
     def propose(cls, scene: Scene) -> Proposed | str:
-        """Ridges are tracked where the law of every contact lets them be, and no damper lifts off."""
+        """With a ridge where every law has one; coarse, and without, where a damper may lift off."""
         told = super().propose(scene)
         if isinstance(told, str):
             return told
-        loose = told.body["parameter"].endswith(".mass")
-        return Proposed({**told.body, "ridge": not (loose or law_issues("ridge", scene))})
+        if told.body["parameter"].endswith(".mass"):
+            return Proposed({**told.body, "ridge": False, "steps": 30, "frequencies": 200})
+        return Proposed({**told.body, "ridge": not law_issues("ridge", scene)})
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
