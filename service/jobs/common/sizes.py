@@ -183,9 +183,8 @@ def marched_for_hours(scene: Scene) -> str:
     from solver.studies.memory import whole_coordinates
 
     count = whole_coordinates(scene) if scene.structure.kind == "matrices" else 0
-    if count <= MOST_COUPLED:
-        return ""
-    return f"Each step couples all {count} motions of the matrices: a march takes hours, and wants its keys."
+    words = f"Each step couples all {count} motions of the matrices: a march takes hours, and wants its keys."
+    return words if count > MOST_COUPLED else ""
 
 
 def is_quick(scene: Scene) -> bool:

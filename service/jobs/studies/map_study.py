@@ -65,12 +65,13 @@ class Map(RangeRequest):
 
     @classmethod
     def propose(cls, scene: Scene) -> Proposed | str:
-        """With a ridge where every law has one; coarse, and without, where a damper may lift off."""
+        """With a ridge where every law has one; of dampers that lift off without, coarse, of heavy ones."""
         told = super().propose(scene)
         if isinstance(told, str):
             return told
         if told.body["parameter"].endswith(".mass"):
-            return Proposed({**told.body, "ridge": False, "steps": 30, "frequencies": 200})
+            few = {"from": 1.5 * scene.value(told.body["parameter"]), "steps": 30, "frequencies": 200}
+            return Proposed({**told.body, **few, "ridge": False})
         return Proposed({**told.body, "ridge": not law_issues("ridge", scene)})
 
     def sizes(self, scene: Scene) -> list[Issue]:
