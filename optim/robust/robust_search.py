@@ -52,6 +52,7 @@ class RobustSearch:
         self.responses = 0
         self._on_progress, self._should_stop = on_progress, should_stop
         self._outcomes: dict[Key, Outcome] = {}
+        self._sure: dict[Key, Known] = {}
         self._ahead: Ahead[Key, Outcome] = Ahead(should_stop)
         self._on_best = on_best
         self._known: tuple[tuple[int, int], tuple[float, float]] | None = (
@@ -133,9 +134,11 @@ class RobustSearch:
 
     def known(self, values: Mapping[str, float], scenario: Scenario) -> Known:
         """Return how well the highest peak of a design in a scenario is known."""
-        found = known_in(self.problem, values, scenario, self._should_stop)
-        self.count(len(self.problem.cases))
-        return found
+        key = self._key(values, scenario, gradients=False)
+        if key not in self._sure:
+            self._sure[key] = known_in(self.problem, values, scenario, self._should_stop)
+            self.count(len(self.problem.cases))
+        return self._sure[key]
 
     def needs_more_harmonics(self, best: Local, scenarios: Sequence[Scenario]) -> bool:
         """Return whether a design has to be looked for again with twice the harmonics, and can be."""

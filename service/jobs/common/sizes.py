@@ -24,8 +24,7 @@ QUICK_DOFS = 500
 """Of the whole disk: of so many it is quickly known how fast they move."""
 FEWEST_STEPS = 256
 """Of a period, where the solver chooses them."""
-MOST_COUPLED = 250
-"""Motions of full matrices; with more a march of a hundred periods takes more than half an hour."""
+MOST_COUPLED = 250  # motions of full matrices; of more a hundred periods take half an hour
 MOST_MOTIONS = 40
 """Points of the curve of a mode with loops and shapes."""
 POINTS_OF_A_SWEEP = 20

@@ -143,7 +143,8 @@ class Mistuning(Study, HarmonicRequest):
         if isinstance(told, str):
             return told
         few = {"samples": 20, "harmonics": 3} if sectors * len(scene.contacts) > DEAR_FROM else {}
-        return told._replace(body={**told.body, **few}, times=few.get("samples", 100) * sectors)
+        disks = cls.model_construct(None, **few).samples
+        return told._replace(body={**told.body, **few}, times=disks * sectors)
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return why it is no disk, and what is wrong with DOF and range."""
