@@ -19,7 +19,7 @@ from scipy.optimize import linprog
 
 from optim.criteria.constraint_rows import DesignEvaluation
 from optim.criteria.peak_criterion import BAND, PEAK
-from optim.methods.enough_harmonics import only_if_known
+from optim.methods.enough_harmonics import by_first_response, only_if_known
 from optim.methods.evaluator import DesignSearch, SearchStoppedError
 from optim.methods.linearised import ACTIVE, Model, bounds_held
 from optim.problem.checks import DesignError, whole
@@ -83,11 +83,14 @@ def pareto_front(
         An argument that is no key.
     """
     begun = clock()
-    posed = replace(pose(scene, limits, **problem), keeps_measure=True)
+    posed = pose(scene, limits, **problem)
     whole("points", points, least=FEWEST_POINTS)
     if posed.method is Method.PERFORMANCE_CURVE:
         raise DesignError("method", posed.method.value, "must be another one: a curve knows no band")
-    front = _Front(posed, points, on_progress, should_stop)
+    # The designs of a front are compared by one measure: that of the first response.
+    measured, told = by_first_response(posed, should_stop)
+    front = _Front(replace(measured, keeps_measure=True), points, on_progress, should_stop)
+    front.evaluations = len(told)
     status = front.run()
     if on_progress is not None:
         on_progress(1.0, max(front.reported, front.evaluations))
@@ -96,8 +99,7 @@ def pareto_front(
     if claims and any(point.design.status is DesignStatus.NOT_KNOWN for point in front.found):
         status = ParetoStatus.NOT_KNOWN
     return ParetoResult(
-        problem=front.problem, status=status, ends=tuple(front.ends), points=kept,
-        dominated=dominated,
+        problem=front.problem, status=status, ends=tuple(front.ends), points=kept, dominated=dominated,
         missed=tuple(front.missed), evaluations=front.evaluations, seconds=clock() - begun,
     )  # fmt: skip
 
@@ -221,11 +223,10 @@ class _Front:
             self.missed.append(width)
             return
         result = DesignResult(
-            problem=limited, status=judge(local),
-            method=Method.IPOPT if self.problem.method is Method.IPOPT else Method.MINIMAX,
-            evaluation=local.evaluation, conditions=local.conditions, basins=(),
-            history=tuple(search.history[1:]),
-            evaluations=len(search.history) - 1, work=float(len(search.history) - 1), seconds=0.0,
+            problem=limited, status=judge(local), evaluation=local.evaluation, conditions=local.conditions,
+            method=Method.IPOPT if self.problem.method is Method.IPOPT else Method.MINIMAX, basins=(),
+            history=tuple(search.history[1:]), evaluations=len(search.history) - 1,
+            work=float(len(search.history) - 1), seconds=0.0,
         )  # fmt: skip
         # d peak / d band along the front [m/Hz] from the multipliers of the limit on the band.
         pull = sum(x for row, x in local.conditions.rows if row.quantity is BAND)
@@ -251,9 +252,8 @@ def steepest(model: Model, variables: Sequence[BoundedVariable]) -> float:
     held = [unit for _, _, unit in bounds_held(model.z, variables)]
     columns = np.vstack([model.slopes[near], model.excess_slopes[band], *held]).T
     count, limits = int(near.sum()), int(sum(band))
-    sums = np.zeros(columns.shape[1])
+    sums, price = np.zeros((2, columns.shape[1]))
     sums[:count] = 1.0
-    price = np.zeros(columns.shape[1])
     price[count : count + limits] = -1.0
     # The optimum is known to a residual: its conditions hold within that, not exactly.
     both = np.vstack([columns, -columns])

@@ -38,12 +38,9 @@ _MOST_POINTS = 50_000
 def _about(attempt: Attempt, seconds: float | None = None) -> AbstractContextManager[None]:
     """Put an attempt on the lines that are logged inside the block."""
     return logs.about(
-        job=attempt.job_id,
-        kind=attempt.kind,
-        attempt=attempt.attempt,
-        owner=attempt.owner or None,
+        job=attempt.job_id, kind=attempt.kind, attempt=attempt.attempt, owner=attempt.owner or None,
         seconds=seconds,
-    )
+    )  # fmt: skip
 
 
 class JobQueue:

@@ -174,3 +174,20 @@ def test_the_picture_shows_the_front_the_knee_and_the_frequencies_at_risk() -> N
     assert sorted(drawn[0].get_xdata()) == pytest.approx(sorted(p.band_hz for p in front().points))
     bars = sum(len(p.intervals) for p in front().points)
     assert len(risk.lines) == bars + len(front().points)
+
+
+def test_a_front_of_what_contacts_alone_hold_is_of_half_peak_to_peak() -> None:
+    """The mean of the platforms is free: a front of max|x| had no point that is known."""
+    wedge, variable = solver.load_scene("platform-wedge"), "wedge.mass"
+    found = optim.pareto_front(wedge, variables={variable: (0.03, 0.06)}, points=4)
+    assert found.status is ParetoStatus.COMPLETE
+    assert found.measured.measure == "half_peak_to_peak"
+    centred = wedge.model_copy(
+        update={"observe": wedge.observe.model_copy(update={"measure": "half_peak_to_peak"})}
+    )
+    for mass in np.geomspace(0.03, 0.06, 12):
+        branch = solver.sweep(centred.with_values({variable: float(mass)}))
+        assert branch.peak is not None
+        assert branch.band is not None
+        peak, band = branch.peak.value, branch.band.width
+        assert not any(peak < p.peak * (1 - 1e-6) and band < p.band_hz * (1 - 1e-6) for p in found.points)

@@ -43,3 +43,15 @@ def test_a_study_of_unequal_blades_is_priced_by_its_blades() -> None:
     assert small.times == 100 * 8
     assert large.body["samples"] == 20
     assert large.times == 20 * 24
+
+
+def test_of_a_damper_that_lifts_off_heavy_ones_are_proposed_where_every_mass_counts() -> None:
+    scene = solver.load_scene("platform-cylinder")
+    front, grid, design = (study_named(kind).propose(scene) for kind in ("pareto", "map", "design"))
+    assert not isinstance(front, str)
+    assert not isinstance(grid, str)
+    assert not isinstance(design, str)
+    low, high = design.body["variables"]["cylinder.mass"]
+    assert front.body["variables"]["cylinder.mass"] == [1.5 * scene.value("cylinder.mass"), high]
+    assert grid.body["from"] == 1.5 * scene.value("cylinder.mass") > low
+    assert "fold" in study_named("peaks").propose(scene)

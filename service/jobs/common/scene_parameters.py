@@ -47,16 +47,12 @@ def proposals(scene: Scene) -> list[StudyProposal]:
         proposed = Proposed() if isinstance(told, str) else told
         found.append(
             StudyProposal(
-                kind=study.NAME,
-                title=asks.title,
-                group=asks.group,
-                body=dict(proposed.body),
-                assumed=list(proposed.assumed),
-                of_peak=dict(proposed.of_peak),
+                kind=study.NAME, title=asks.title, group=asks.group, body=dict(proposed.body),
+                assumed=list(proposed.assumed), of_peak=dict(proposed.of_peak),
                 points=None if asks.points is None else asks.points * proposed.times,
                 refused=told if isinstance(told, str) else None,
             )
-        )
+        )  # fmt: skip
     return found
 
 

@@ -13,14 +13,13 @@ from service.jobs.common.result_models import Table
 from service.jobs.common.scene_requests import HarmonicRequest, Number, ParameterPath, check
 from service.jobs.common.sizes import balance_issues
 from service.jobs.kind_registry import Flag
-from service.jobs.study import Answer, Proposed, Study, Watch
+from service.jobs.study import Answer, Proposed, Study, Watch, rounded
 from solver.errors import Issue, Naming, Shown
 from solver.lab import from_lab
 from solver.scene.descriptions import DISK_LOAD
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
-
 
 AUTO = "auto"
 WORDS = (AUTO, "all", "even-harmonics", "every-contact", "every-port", "every-sector", "whole-matrices")
@@ -65,6 +64,7 @@ def solved_issues(
 
 FREQUENCY = "frequency"
 NOTHING_DESIGNED = "The scene has no contact to design."
+_HEAVY = 1.5  # times its own mass a damper stays in its seat
 
 
 class RangeRequest(Study, HarmonicRequest):
@@ -86,6 +86,14 @@ class RangeRequest(Study, HarmonicRequest):
         for path, (low, high) in designed(scene).items():
             return Proposed({"parameter": path, "from": low, "to": high})
         return NOTHING_DESIGNED
+
+
+def heavy(scene: Scene, path: str) -> float | None:
+    """Return the mass from which a damper stays in its seat; None where `path` is no mass of one.
+
+    Lighter ones lift off: then a point takes a second or is not found, and peaks fold.
+    """
+    return rounded(_HEAVY * scene.value(path)) if path.endswith(".mass") else None
 
 
 def range_issues(request: RangeRequest, scene: Scene) -> list[Issue]:

@@ -39,27 +39,16 @@ def sweep_record(
     amplitude = "excitation.amplitude"
     unstable = branch.bifurcations.unstable
     return SweepRecord(
-        scene_name=scene.name,
-        scene_hash=digest(scene.to_dict()),
-        parameter=parameter,
-        from_value=branch.start,
-        to_value=branch.stop,
-        frequency_hz=frequency_hz,
+        scene_name=scene.name, scene_hash=digest(scene.to_dict()), parameter=parameter,
+        from_value=branch.start, to_value=branch.stop, frequency_hz=frequency_hz,
         excitation_amplitude=None if parameter == amplitude else scene.value(amplitude),
-        harmonics=branch.n_harmonics,
-        points=len(branch.values),
-        peak=None if peak is None else peak.value,
-        peak_at=None if peak is None else peak.at,
-        limit=None if band is None else band.limit,
-        band_hz=None if band is None else band.width,
-        newton_iterations=branch.newton_iterations,
-        rejected_steps=branch.rejected_steps,
-        seconds=branch.seconds,
-        completed=branch.reached,
-        status=branch.status.value,
+        harmonics=branch.n_harmonics, points=len(branch.values),
+        peak=None if peak is None else peak.value, peak_at=None if peak is None else peak.at,
+        limit=None if band is None else band.limit, band_hz=None if band is None else band.width,
+        newton_iterations=branch.newton_iterations, rejected_steps=branch.rejected_steps,
+        seconds=branch.seconds, completed=branch.reached, status=branch.status.value,
         error_estimate=json_number(branch.error_estimate),
-        peaks_known=branch.peak_certificate.known,
-        intermediate=intermediate,
+        peaks_known=branch.peak_certificate.known, intermediate=intermediate,
         contacts=contact_values(scene, parameter),
         arrays={
             "parameter": StoredArray.of(branch.values),
@@ -68,7 +57,7 @@ def sweep_record(
         }
         | {name: StoredArray.of(getattr(branch, name)) for name in _ARRAYS}
         | ({"unstable": StoredArray.of(unstable.astype(np.int8))} if unstable.any() else {}),
-    )
+    )  # fmt: skip
 
 
 def sweep_records(branches: Iterable[AnyBranch], *, intermediate: bool = False) -> tuple[SweepRecord, ...]:

@@ -41,16 +41,14 @@ def body_model(name: str, request: type[JobRequest]) -> type[BaseModel]:
     kind: Any = (Literal[name], Field(description="Kind of the job."))
     return create_model(
         title,
-        __base__=request,
-        __doc__=request.__doc__,
-        __module__=request.__module__,
+        __base__=request, __doc__=request.__doc__, __module__=request.__module__,
         __cls_kwargs__={
             "json_schema_extra": described,
             "title": f"{request.__name__.removesuffix(_WORD)}{_WORD}",
             "defer_build": False,
         },
         kind=kind,
-    )
+    )  # fmt: skip
 
 
 def any_body(registry: Registry) -> Any:
@@ -66,16 +64,14 @@ def design_body(registry: Registry) -> type[BaseModel]:
     kind: Any = (only, Field(default=DESIGN, description="Kind of the job."))
     return create_model(
         "OnlyDesignBody" if known else "NoDesignBody",
-        __base__=base,
-        __doc__=base.__doc__,
-        __module__=base.__module__,
+        __base__=base, __doc__=base.__doc__, __module__=base.__module__,
         __cls_kwargs__={
             "title": base.__name__,
             "extra": "forbid" if known else "allow",
             "defer_build": False,
         },
         kind=kind,
-    )
+    )  # fmt: skip
 
 
 def _only_design(value: object) -> object:

@@ -467,8 +467,7 @@ PREVIEWS = Registry(
     [
         JobKind(
             name="sweep", summary="The frequency response over the scene's band.",
-            request=SweepPreviewRequest, resolve=resolve_sweep, run=run_sweep,
-            result=SweepPreview,
+            request=SweepPreviewRequest, resolve=resolve_sweep, run=run_sweep, result=SweepPreview,
         ),
         JobKind(
             name="sensitivities", summary="Per cent of peaks and band for one per cent of each parameter.",
@@ -477,18 +476,15 @@ PREVIEWS = Registry(
         ),
         JobKind(
             name="limits", summary="The linear responses with a contact removed and stuck.",
-            request=LimitsPreviewRequest, resolve=resolve_limits, run=run_limits,
-            result=LimitsPreview,
+            request=LimitsPreviewRequest, resolve=resolve_limits, run=run_limits, result=LimitsPreview,
         ),
         JobKind(
             name="point", summary="One period at a frequency, with loops and states of the contacts.",
-            request=PointPreviewRequest, resolve=resolve_point, run=run_point,
-            result=PointPreview,
+            request=PointPreviewRequest, resolve=resolve_point, run=run_point, result=PointPreview,
         ),
         JobKind(
             name="shape", summary="How everything moves over a period, at a frequency or in a mode.",
-            request=ShapePreviewRequest, resolve=resolve_shape, run=run_shape,
-            result=ShapePreview,
+            request=ShapePreviewRequest, resolve=resolve_shape, run=run_shape, result=ShapePreview,
         ),
     ],
     warm_up,

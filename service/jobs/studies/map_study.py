@@ -12,7 +12,7 @@ from pydantic import Field
 from service.jobs.common.result_models import Curve, KindResult, answered
 from service.jobs.common.scene_requests import CHECKED_BY, SCENE, stored_scene
 from service.jobs.common.sizes import MOST_POINTS, balance_issues
-from service.jobs.common.study_keys import RangeRequest, law_issues, range_issues
+from service.jobs.common.study_keys import RangeRequest, heavy, law_issues, range_issues
 from service.jobs.job_parts import Division, JobPart, PartOutput, PartStoppedError
 from service.jobs.kind_registry import Flag, JobKind, Json
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
@@ -69,9 +69,9 @@ class Map(RangeRequest):
         told = super().propose(scene)
         if isinstance(told, str):
             return told
-        if told.body["parameter"].endswith(".mass"):
-            few = {"from": 1.5 * scene.value(told.body["parameter"]), "steps": 30, "frequencies": 200}
-            return Proposed({**told.body, **few, "ridge": False})
+        if least := heavy(scene, told.body["parameter"]):
+            few = {"from": least, "steps": 30, "frequencies": 200, "ridge": False}
+            return Proposed({**told.body, **few})
         return Proposed({**told.body, "ridge": not law_issues("ridge", scene)})
 
     def sizes(self, scene: Scene) -> list[Issue]:

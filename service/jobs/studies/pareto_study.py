@@ -8,8 +8,9 @@ from optim.problem.problem_keys import PointsOfFront, of_front
 from service.jobs.common.problem_requests import ProblemRequest
 from service.jobs.common.result_models import answered
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.common.study_keys import heavy
 from service.jobs.stored_figures import SweepRecord
-from service.jobs.study import Question
+from service.jobs.study import Proposed, Question
 from solver.errors import Issue
 from solver.scene.descriptions import DISK_LOAD
 
@@ -35,6 +36,17 @@ class _Pareto(PointsOfFront, ProblemRequest):
     TOLD = "optim.views.tables.design:front"
     SHOWS, SWEEPS = "the front of [peak against band](design.md#peak-against-band)", "those of its points"
     EMPTY, FIGURE = ("points", "its front has no point"), "optim.views.plots.figures:pareto_figure"
+
+    @classmethod
+    def propose(cls, scene: Scene) -> Proposed | str:
+        """Of a damper that lifts off, heavy ones: among the light ones the narrowest band is no design."""
+        told = super().propose(scene)
+        if isinstance(told, str):
+            return told
+        ranges = told.body["variables"].items()
+        return Proposed(
+            {"variables": {path: [heavy(scene, path) or low, high] for path, (low, high) in ranges}}
+        )
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""

@@ -13,6 +13,7 @@ from service.jobs.common.study_keys import (
     CERTIFICATES,
     Certify,
     RangeRequest,
+    heavy,
     law_issues,
     prepare,
     range_issues,
@@ -58,7 +59,7 @@ class Peaks(RangeRequest):
     def propose(cls, scene: Scene) -> Proposed | str:
         """Return the range of what is designed by itself, where peaks can be tracked."""
         wrong, told = law_issues("scene", scene), super().propose(scene)
-        if not isinstance(told, str) and told.body["parameter"].endswith(".mass"):
+        if not isinstance(told, str) and heavy(scene, told.body["parameter"]):
             return "Peaks of a damper that lifts off fold, and are not followed with certainty: take the map."
         return wrong[0].said() if wrong else told
 

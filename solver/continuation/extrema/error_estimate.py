@@ -47,6 +47,7 @@ SAFETY = 1.7
 # does not tell what more harmonics do, and the balance with them is solved.
 _FIRST_ORDER = 0.1
 _INSTANTS = 512  # of a period, at which the force of a law is compared with that of a finer one
+_DEAR = 1000  # unknowns: so many are not solved from nothing for an estimate, which takes minutes
 _NEARER = 2.0 / 3.0  # of the harmonics added: these are looked at without the others too
 
 
@@ -192,12 +193,12 @@ class ErrorEstimator:
     def _solved(self, x: Real, U: Real, p: float, largest: Real) -> Real:
         """Return the changes of a motion to the solution with more harmonics, or else to that with fewer.
 
-        From U on it may not be found where a harmonic added meets a resonance, but from nothing. The latter
-        are about those of twice the harmonics, if not more; they count if below `largest`.
+        From U on it may not be found where a harmonic added meets a resonance, but from nothing, if that is
+        not dear. The latter are about those of twice the harmonics, if not more, and count below `largest`.
         """
         larger, after = self._larger, np.empty(x.size)
         found = larger.solve_from(p, U)
-        if not found.converged:
+        if not found.converged and U.size < _DEAR:
             found = larger.solve(p)
         if found.converged and motion_at(larger.system, larger.linear, larger.point, found.u, p, True, after):
             return np.array(change_of(larger.system, x, after))

@@ -12,9 +12,8 @@ from pydantic import BaseModel, Field, RootModel
 from optim.criteria.key import Name
 from service.jobs.common.result_models import answered
 from service.jobs.common.scene_requests import LEAST, FrequencyHz, HarmonicRequest, Number, check
-from service.jobs.common.sizes import balance_issues
+from service.jobs.common.sizes import balance_issues, is_dear_disk
 from service.jobs.kind_registry import Flag, Json
-from service.jobs.studies.mistuning_study import DEAR_FROM
 from service.jobs.study import Answer, Proposed, Question, Study, Watch, middle_hz, rounded
 from solver.errors import Issue
 
@@ -99,10 +98,9 @@ class QuasiPeriodicStudy(Study, HarmonicRequest):
             return "The scene has no excitation."
         middle = middle_hz(scene)
         # Two forces do not travel round a disk as one wave: every contact of it counts.
-        dear = scene.structure.sector_count * len(scene.contacts) > DEAR_FROM
         harmonics, turns = next(
             pair
-            for pair in _SIZES[dear:]
+            for pair in _SIZES[is_dear_disk(scene) :]
             if pair is _SIZES[-1] or not balance_issues("", scene, math.prod(pair), 1)
         )
         body = {
