@@ -84,7 +84,11 @@ def test_a_study_is_taken_as_it_is_proposed(shipped: httpx.Client, name: str) ->
         assert answer.is_success, (study, answer.text)
         shipped.delete(f"/v1/jobs/{answer.json()['id']}")
         if "variables" in study["body"]:
-            assert study["body"]["variables"] == {path: bounds}
+            # Of a damper that lifts off, a front is proposed of the heavy ones.
+            least = (
+                1.5 * scene.value(path) if path.endswith(".mass") and study["kind"] == "pareto" else bounds[0]
+            )
+            assert study["body"]["variables"] == {path: [least, bounds[1]]}
 
 
 def test_a_map_follows_ridges_where_every_law_lets_it(shipped: httpx.Client) -> None:
