@@ -68,11 +68,10 @@ Out = Annotated[
 Database = Annotated[
     str | None,
     typer.Option(
-        "--database",
-        metavar="URL",
+        "--database", metavar="URL",
         help="sqlite:///path or postgresql://user@host/name; STICKSLIP_DATABASE sets it too.",
     ),
-]
+]  # fmt: skip
 Workers = Annotated[int | None, count("--workers", "N", "Worker processes; one a processor.")]
 Url = Annotated[
     str, typer.Option("--url", metavar="URL", envvar="STICKSLIP_URL", help="Where the service is.")
@@ -123,12 +122,10 @@ KEY_VARIABLE = "STICKSLIP_KEY"
 KeyFile = Annotated[
     str | None,
     typer.Option(
-        "--key-file",
-        metavar="F",
-        envvar="STICKSLIP_KEY_FILE",
+        "--key-file", metavar="F", envvar="STICKSLIP_KEY_FILE",
         help=f"File with the key to the service; else {KEY_VARIABLE} of the environment.",
     ),
-]
+]  # fmt: skip
 
 
 def keyed(command: Command) -> Command:

@@ -177,7 +177,7 @@ def posed(
         }
     request = checked(replace(told, body=body), study)
     scene = inputs.left_out(_with_values(told, scene, request), without)
-    given = arguments(request)
+    given = study.completed(scene, arguments(request))
     # Before kernels are loaded, which what is wrong with a problem is found by.
     prepare(lambda: cost(study.NAME, scene, given))
     if issues := request.issues(scene):

@@ -79,11 +79,9 @@ Parts = Annotated[
 
 
 @router.post(
-    "",
-    status_code=201,
-    response_model=NewUpload,
+    "", status_code=201, response_model=NewUpload,
     responses={200: {"model": NewUpload, "description": "The same file was uploaded before."}},
-)
+)  # fmt: skip
 async def upload(
     context: InContext, name: FileName = "matrices", form: Format = None, part: Parts = _WHOLE
 ) -> Response:
@@ -190,10 +188,9 @@ class MatricesRequest(AskedModel):
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
 
     uploads: list[UploadId] = Field(
-        default=[],
-        max_length=6,
+        default=[], max_length=6,
         description="Ids, in place of `structure`: which is M, K, C or names the rows is found out.",
-    )
+    )  # fmt: skip
     structure: dict[Annotated[str, Field(max_length=100)], Any] | None = Field(
         default=None, description="Of kind `matrices`; of a sector with `sectors` and `cyclic`."
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from optim.problem.problem_keys import PointsOfFront, of_front
@@ -47,6 +48,11 @@ class _Pareto(PointsOfFront, ProblemRequest):
         return Proposed(
             {"variables": {path: [heavy(scene, path) or low, high] for path, (low, high) in ranges}}
         )
+
+    @classmethod
+    def lacks(cls, given: Collection[str]) -> bool:
+        """Return whether it is left open what is designed: then it is what is proposed."""
+        return "variables" not in given
 
     def sizes(self, scene: Scene) -> list[Issue]:
         """Return what is too large."""
