@@ -210,8 +210,7 @@ class _Front:
             starts = sorted([*rebound, *([middle] if middle.good else [])], key=search.merit)
             begin = [starts[0]]
             for evaluation in starts[1:]:
-                place = scaled(search.variables, evaluation.values)
-                apart = math.dist(place, scaled(search.variables, begin[0].values))
+                apart = math.dist(*(scaled(search.variables, one.values) for one in (evaluation, begin[0])))
                 if len(begin) < 2 and FAR_APART < apart <= math.dist(*z) + FAR_APART:
                     begin.append(evaluation)
             local_search = local_search_of(search.problem.method)

@@ -400,14 +400,15 @@ def parameter_unit(path: str) -> str:
     from solver.contacts.laws.law_registry import laws
     from solver.contacts.laws.load_harmonics import higher_quantity, order_of
 
-    units = {FREQUENCY: "Hz", AMPLITUDE: "N", PHASE: "rad"}
+    units = {FREQUENCY: "Hz", AMPLITUDE: "N", PHASE: "rad", of_bodies.SPEED: "1/min"}
     owner, _, key = path.rpartition(".")
     if path in units or owner == "structure":
         return units.get(path, "")
     if order_of(key) is not None:
         return higher_quantity(key).unit
-    # A path does not say which law its contact has: laws that share a word must agree.
+    # A path does not say what its owner is: laws, and shapes of bodies, that share a word must agree.
     found = {law.PARAMETERS[key].unit for law in laws().values() if key in law.PARAMETERS}
+    found |= {of_bodies.UNITS[key]} if key in of_bodies.UNITS else set()
     return found.pop() if len(found) == 1 else ""
 
 

@@ -55,3 +55,12 @@ def test_of_a_damper_that_lifts_off_heavy_ones_are_proposed_where_every_mass_cou
     assert front.body["variables"]["cylinder.mass"] == [1.5 * scene.value("cylinder.mass"), high]
     assert grid.body["from"] == 1.5 * scene.value("cylinder.mass") > low
     assert "fold" in study_named("peaks").propose(scene)
+
+
+def test_a_front_without_variables_is_the_one_proposed() -> None:
+    scene, study = solver.load_scene("platform-cylinder"), study_named("pareto")
+    told = study.propose(scene)
+    assert not isinstance(told, str)
+    assert study.completed(scene, {"points": 3}) == {**told.body, "points": 3}
+    own = {"variables": {"cylinder.mass": [0.001, 0.002]}}
+    assert study.completed(scene, own) == own

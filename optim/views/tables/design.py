@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from solver.results import units
-from solver.results.known import Measured, known_pairs, note_pairs, stable_pairs
+from solver.results.known import MAX_ABS, Measured, known_pairs, note_pairs, stable_pairs
 from solver.results.order_statistics import quantile_words
 from solver.results.told import Block, ResultTable, Summary
 from solver.results.units import duration, quantity
@@ -50,8 +50,7 @@ def front(found: Json) -> Iterator[Block]:
         return "" if point["slope"] is None else units.length(abs(point["slope"]) * hertz)
 
     def wider(point: Json) -> str:
-        per = point["hz_per_metre"]
-        return "" if per is None else units.hertz(metres * per)
+        return "" if point["hz_per_metre"] is None else units.hertz(metres * point["hz_per_metre"])
 
     yield _designs(
         f"Front of {found['scene']}: peak against band",
@@ -87,9 +86,10 @@ def _yes(so: bool) -> str:
 
 def _error(point: Json) -> str:
     """The estimated error of the peak of a point; empty of an earlier version."""
-    if "error_estimate" not in point:
+    key = "error_estimate" if point.get("measure", MAX_ABS) == MAX_ABS else "half_peak_to_peak_error"
+    if key not in point:
         return ""
-    return "not known" if point["error_estimate"] is None else units.length(point["error_estimate"])
+    return "not known" if point[key] is None else units.length(point[key])
 
 
 def _price(size: float) -> float:

@@ -125,7 +125,7 @@ def _check(path: str, new: float, unit: str, *, positive: bool = False) -> None:
         raise SettingError(path, new, f"must be a number {'>' if positive else '>='} 0 and <= 1e15 [{unit}]")
 
 
-_UNITS = {
+UNITS = {
     **dict.fromkeys(("angle", "curved_angle"), "rad"), **dict.fromkeys(("width", "length", "radius"), "m"),
     **{key: SpaceContact.PARAMETERS[key].unit for key in Shape.FACE}, POINTS: "", **BODY_UNITS,
 }  # fmt: skip
@@ -178,7 +178,7 @@ def shape_parameter(scene: Scene, path: str) -> SceneParameter | None:
 
     whole = SceneParameter(
         get=get, with_value=lambda new: _with_shape(scene, shape, key, path, new),
-        unit=_UNITS[key], least=-math.inf if key in ("angle", "curved_angle", "N0") else 0.0,
+        unit=UNITS[key], least=-math.inf if key in ("angle", "curved_angle", "N0") else 0.0,
         in_steps=key == POINTS,
     )  # fmt: skip
     if key in shape.FACE:
@@ -203,8 +203,8 @@ def _with_shape(scene: Scene, shape: AnyShape, key: str, path: str, new: float) 
     try:
         made = type(shape).model_validate({**shape.__dict__, **_update(shape, key, new)})
     except ValidationError as error:
-        wanted = bound_said(error.errors()[0], _UNITS[key])
-        raise SettingError(path, new, wanted, doubt_said(new, _UNITS[key])) from error
+        wanted = bound_said(error.errors()[0], UNITS[key])
+        raise SettingError(path, new, wanted, doubt_said(new, UNITS[key])) from error
     dampers = tuple(made if each is shape else each for each in scene.dampers)
     own = own_parts(scene)
     bodies = (body for each in dampers for body in each.bodies)

@@ -10,6 +10,7 @@ from each import each
 import solver
 from solver.contacts.laws.law_registry import laws
 from solver.results import units
+from solver.scene.parameter_paths import parameter_of, parameter_unit
 from solver.scene.validation import unit_of
 
 WRITTEN = [
@@ -116,3 +117,12 @@ def test_the_free_limit_is_the_linear_response() -> None:
     assert free == pytest.approx(
         solver.solve(scene.with_values({"damper.N0": 0.0}), frequency_hz=1.3).max_abs
     )
+
+
+@pytest.mark.parametrize("name", solver.shipped_scenes())
+def test_a_path_alone_tells_the_unit_of_contacts_dampers_and_speed(name: str) -> None:
+    """Tables of results have no scene: of `structure` alone the unit depends on it."""
+    scene = solver.load_scene(name)
+    for path in scene.parameter_paths():
+        if not path.startswith("structure."):
+            assert parameter_unit(path) == parameter_of(scene, path).unit, path
