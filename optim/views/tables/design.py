@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from solver.results import units
-from solver.results.known import MAX_ABS, Measured, known_pairs, note_pairs, stable_pairs
+from solver.results.known import Known, Measured, known_pairs, note_pairs, stable_pairs
 from solver.results.order_statistics import quantile_words
 from solver.results.told import Block, ResultTable, Summary
 from solver.results.units import duration, quantity
@@ -86,10 +86,10 @@ def _yes(so: bool) -> str:
 
 def _error(point: Json) -> str:
     """The estimated error of the peak of a point; empty of an earlier version."""
-    key = "error_estimate" if point.get("measure", MAX_ABS) == MAX_ABS else "half_peak_to_peak_error"
-    if key not in point:
+    if "error_estimate" not in point:
         return ""
-    return "not known" if point[key] is None else units.length(point[key])
+    error = Known.of_result(point).error
+    return units.length(error) if math.isfinite(error) else "not known"
 
 
 def _price(size: float) -> float:

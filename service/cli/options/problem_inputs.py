@@ -177,12 +177,12 @@ def posed(
         }
     request = checked(replace(told, body=body), study)
     scene = inputs.left_out(_with_values(told, scene, request), without)
-    given = study.completed(scene, arguments(request))
+    given = arguments(request)
     # Before kernels are loaded, which what is wrong with a problem is found by.
     prepare(lambda: cost(study.NAME, scene, given))
     if issues := request.issues(scene):
         raise told.refusal(issues)
-    return scene, given
+    return scene, study.completed(scene, given)
 
 
 def checked(told: Description, model: type[ProblemRequest]) -> ProblemRequest:

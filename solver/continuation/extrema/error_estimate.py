@@ -71,10 +71,10 @@ class ErrorEstimator:
     the first order misses. Harmonic by harmonic the change goes up and down, and its sum may come out near
     zero by accident: so a step by the residual of the nearer of the harmonics added is looked at too.
     Where the second step is long, as where a stiff contact stops the motion for a while, that balance is
-    solved at fixed λ and its change counts instead; if no solution is found, from that motion or from
-    nothing, the difference from the one with half of the harmonics, if that is less. The estimate is the
-    largest change of the amplitude, at least a tenth of the change of the motion at its worst instant, times
-    `SAFETY`.
+    solved at fixed λ and its change counts instead; if no solution is found, from that motion or, if
+    that is not dear, from nothing, the difference from the one with half of the harmonics, if that is less.
+    The estimate is the largest change of the amplitude, at least a tenth of the change of the motion at its
+    worst instant, times `SAFETY`.
 
     Harmonics still beyond are added with coefficients that fall like 1/k², as those of a force with kinks do,
     weighted by the receptance of the structure with the mean stiffness of its contacts, so that a resonance

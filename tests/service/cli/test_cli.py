@@ -317,3 +317,11 @@ def test_an_argument_of_python_is_an_option_of_the_command(run: Run) -> None:
     wrong = "map two-dof --parameter damper.N9 --from 1 --to 2"
     assert "`--parameter` must be one of " in run(wrong)[2]
     assert "`--set` must be one of " in run("sweep two-dof --set damper.N9=1")[2]
+
+
+def test_a_front_of_what_has_nothing_to_design_asks_for_a_variable(run: Run, tmp_path: Path) -> None:
+    bare = {**solver.load_scene("two-dof").to_dict(), "contacts": []}
+    (tmp_path / "bare.json").write_text(json.dumps(bare))
+    status, _, told = run("pareto bare.json")
+    assert status == 2
+    assert "`--variable` must be given" in told
