@@ -62,6 +62,28 @@ def test_studies_are_questions_that_are_filled_in(browser: Browser, site: Site) 
         expect(page.locator("#identify")).to_be_visible()
 
 
+def test_a_study_takes_the_range_proposed_for_it_until_the_bar_says_another(
+    browser: Browser, site: Site
+) -> None:
+    """Every mass is designed; of a damper that lifts off only heavy ones are mapped and have a front."""
+    with opened(browser, site) as (context, _):
+        page = context.new_page()
+        page.goto(f"{site.url}/?scene=platform-cylinder&tab=studies")
+        page.locator("html[data-ready]").wait_for(state="attached")
+        expect(page.locator("#ask-design-bar")).to_have_text("cylinder.mass from 0.4 g to 60 g")
+        for kind in ("pareto", "map"):
+            expect(page.locator(f"#ask-{kind}-bar")).to_have_text("cylinder.mass from 6 g to 60 g")
+        with page.expect_response(lambda one: one.url.endswith("/v1/jobs") and one.status < 300) as answer:
+            page.click("#ask-pareto-submit")
+        job = answer.value.json()
+        assert job["request"]["variables"] == {"cylinder.mass": [0.006, 0.06]}
+        httpx.delete(f"{site.url}/v1/jobs/{job['id']}")
+        page.fill("#low", "10")
+        page.locator("#low").blur()
+        for kind in ("design", "pareto", "map"):
+            expect(page.locator(f"#ask-{kind}-bar")).to_have_text("cylinder.mass from 10 g to 60 g")
+
+
 STUDIES = {
     "margin": (
         {

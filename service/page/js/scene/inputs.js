@@ -2,11 +2,10 @@
 
 import { state } from "../base/state.js";
 import { quantity } from "../base/format.js";
-import { hasHarmonics } from "./kinds.js";
+import { barRange, hasHarmonics, rangeOf } from "./kinds.js";
 import { givenByScene, variable, variables } from "./scenes.js";
 
-const USUAL_HARMONICS = 11;
-const CLOSE = 1e-9;
+const [USUAL_HARMONICS, CLOSE] = [11, 1e-9];
 const same = (a, b) => a === b || Math.abs(a - b) <= CLOSE * Math.max(Math.abs(a), Math.abs(b));
 
 // The paths that a study varies itself: what they are set to does not matter to it.
@@ -24,21 +23,14 @@ function changedValues(request) {
   });
 }
 
-// The range of a study of one variable, as it was asked.
-function rangeOf({ variables, parameter, from, to }) {
-  if (parameter && from !== undefined) return [parameter, [from, to]];
-  const asked = Object.entries(variables ?? {});
-  return asked.length === 1 ? asked[0] : null;
-}
-
-function changedRange(request) {
+function changedRange(kind, request) {
   const asked = rangeOf(request);
   if (!asked || asked[0] === "frequency" || !state.range) return [];
   const [path, [low, high]] = asked;
   // What the form above does not offer it does not change either.
   if (!variables().includes(path)) return [];
   if (path !== variable()) return [`${path} varied, now ${variable() || "nothing"}`];
-  const [from, to] = state.range;
+  const [from, to] = barRange(kind);
   if (same(low, from) && same(high, to)) return [];
   return [`${path} from ${quantity(path, low)} to ${quantity(path, high)}, now ${quantity(path, from)} to ${quantity(path, to)}`];
 }
@@ -47,7 +39,7 @@ function changedRange(request) {
 export function differences(kind, request) {
   const [was, is] = [request.harmonics ?? USUAL_HARMONICS, state.harmonics];
   const harmonics = was === is || !hasHarmonics(kind) ? [] : [`${was} harmonics, now ${is}`];
-  return [...changedValues(request), ...changedRange(request), ...harmonics];
+  return [...changedValues(request), ...changedRange(kind, request), ...harmonics];
 }
 
 // Whether two requests look at the same scene with the same values.

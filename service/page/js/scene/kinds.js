@@ -5,14 +5,13 @@ import { request } from "../network/api.js";
 import { fieldsOf } from "../forms/fields.js";
 import { on, state, tell } from "../base/state.js";
 import { learnUnits, seconds } from "../base/format.js";
-import { asked, current, variable } from "./scenes.js";
+import { asked, current, defaultRange, variable } from "./scenes.js";
 
 // The scene, the run and the queue are asked for elsewhere on the page.
 const OF_THE_PAGE = ["kind", "scene", "set", "fresh", "priority", "max_seconds", "project", "name", "notes", "tags"];
 // What the bar says has no field a second time.
 export const OF_THE_BAR = ["parameter", "from", "to", "variables", "scaling", "start"];
-let kinds = new Map();
-let price = 0;
+let [kinds, price] = [new Map(), 0];
 on("cost", (cost) => { price = cost; });
 
 export async function loadKinds() {
@@ -33,10 +32,23 @@ export function askedFor(name) {
   return hasHarmonics(name) ? { ...body, harmonics } : body;
 }
 
+// The range of a study of one variable, as it was asked.
+export function rangeOf({ variables, parameter, from, to }) {
+  if (parameter && from !== undefined) return [parameter, [from, to]];
+  const asked = Object.entries(variables ?? {});
+  return asked.length === 1 ? asked[0] : null;
+}
+
+// The range of the variable of the bar: as long as it is the scene's own, the one that is proposed for a kind.
+export function barRange(name) {
+  const [path, own] = rangeOf(proposed(name)) ?? [];
+  return path === variable() && String(state.range) === String(defaultRange()) ? own : state.range;
+}
+
 // The variable of the bar with its range, in the keys that a kind has for it.
 export function ofTheBar(name) {
   if (!state.range) return {};
-  const [from, to] = state.range;
+  const [from, to] = barRange(name);
   if (keyed(name, "variables")) return { variables: { [variable()]: [from, to] } };
   return keyed(name, "parameter")?.required ? { parameter: variable(), from, to } : {};
 }
@@ -54,8 +66,7 @@ export const takes = (...names) => (secondsOf(...names) ? `about ${seconds(secon
 
 // Why the scene has no such study; empty if it has.
 export const refusedFor = (name) => proposalOf(name)?.refused ?? "";
-let laws = new Map();
-let usual = null;
+let [laws, usual] = [new Map(), null];
 
 export async function loadLaws() {
   const { items } = await request("/v1/laws");

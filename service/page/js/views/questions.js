@@ -9,7 +9,7 @@ import { chart } from "../charts/chart.js";
 import { schemaForm } from "../forms/form.js";
 import { tables } from "../identify/data.js";
 import { resume, run } from "../network/jobs.js";
-import { askedFor, kindNames, kindOf, ofTheBar, proposalOf, refusedFor, takes } from "../scene/kinds.js";
+import { askedFor, barRange, kindNames, kindOf, ofTheBar, proposalOf, refusedFor, takes } from "../scene/kinds.js";
 import { variable } from "../scene/scenes.js";
 import { hasOwnView, viewOf } from "../views.js";
 import { tabOf } from "../workbench/frame.js";
@@ -24,9 +24,8 @@ const PICTURES = {
   margin: "M6 62C46 58 80 46 108 8M6 30H108", sweep: "M6 62C40 60 48 52 54 12C62 52 74 58 108 62", pareto: "M10 8C14 44 40 58 106 62", solve: "M22 60L46 12H92L68 60Z", march: "M6 35C14 6 22 6 30 35S46 64 54 35 70 6 78 35 94 64 102 35", transient: "M6 36C10 28 14 28 18 36S26 46 32 36 42 16 48 36 58 64 66 36 76 8 84 36 94 58 102 36", modes: "M64 66V44C64 32 54 20 38 8", accuracy: "M8 10L40 30L72 44L104 60",
 };
 const cards = new Map();
-let group = "";
-// The highest peak that is seen [m].
-let peak = 0;
+// The group shown; the highest peak that is seen [m].
+let [group, peak] = ["", 0];
 const hasData = (kind) => !MEASURED.includes(kind) || tables().length > 0;
 // The question of a kind, for people; what it computes where nobody put it as one.
 const asks = (kind) => ({ title: kindOf(kind).summary.replace(/\.$/, ""), group: "checks", body: {}, assumed: [], of_peak: {}, ...proposalOf(kind) });
@@ -65,8 +64,7 @@ function build() {
 }
 
 function cardOf(kind) {
-  const { title, group: of } = asks(kind);
-  const refused = refusedFor(kind);
+  const [{ title, group: of }, refused] = [asks(kind), refusedFor(kind)];
   return el("article", { class: `card question${refused ? " refused" : ""}`, id: `ask-${kind}`, "data-of": of, "aria-labelledby": `ask-${kind}-title` },
     svg("svg", { viewBox: "0 0 112 70", "aria-hidden": "true" }, svg("path", { class: "frame", d: "M4 2V68H110" }), svg("path", { d: PICTURES[kind] ?? PICTURES[of] })),
     el("div", {}, el("h3", { id: `ask-${kind}-title` }, title), note(refused || kindOf(kind).summary)),
@@ -95,7 +93,7 @@ function fill(kind, request = null) {
   const { body, of_peak: shares } = asks(kind);
   const ofPeak = peak ? Object.fromEntries(Object.entries(shares).map(([key, share]) => [key, Number((share * peak).toPrecision(3))])) : {};
   cards.get(kind).form.fill(request ?? { ...body, ...ofPeak });
-  byId(`ask-${kind}-bar`).textContent = Object.keys(ofTheBar(kind)).length ? `${variable()} from ${quantity(variable(), state.range[0])} to ${quantity(variable(), state.range[1])}` : "";
+  byId(`ask-${kind}-bar`).textContent = Object.keys(ofTheBar(kind)).length ? `${variable()} from ${barRange(kind).map((end) => quantity(variable(), end)).join(" to ")}` : "";
 }
 
 function filter() {
@@ -115,8 +113,7 @@ const sayOf = (kind, words, bad) => byId(`ask-${kind}-status`) && say(`ask-${kin
 function ask(kind, body) {
   if (!hasData(kind)) return tell("tab", "identify");
   byId(`ask-${kind}-open`).hidden = true;
-  const data = MEASURED.includes(kind) ? { data: tables() } : {};
-  return run(kind, { ...askedFor(kind), ...asks(kind).body, ...ofTheBar(kind), ...data, ...body }, complaining(beside(kind), cards.get(kind).form), 3);
+  return run(kind, { ...askedFor(kind), ...asks(kind).body, ...ofTheBar(kind), ...(MEASURED.includes(kind) && { data: tables() }), ...body }, complaining(beside(kind), cards.get(kind).form), 3);
 }
 
 // The view of a kind, which is told in its card as well.
