@@ -15,7 +15,7 @@ import pytest
 from launch import COMMAND, answers, free_port
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, BrowserContext, Page
+    from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page
 
 READY_SECONDS = 180.0
 
@@ -79,9 +79,13 @@ class Watch:
     allowed: tuple[str, ...] = ()
 
     def listen(self, page: Page) -> None:
-        page.on("console", lambda m: self.said.append(m.text) if m.type in ("error", "warning") else None)
+        page.on("console", self._spoken)
         page.on("pageerror", lambda error: self.said.append(str(error)))
         page.on("request", lambda request: self._requested(request.url))
+
+    def _spoken(self, message: ConsoleMessage) -> None:
+        if message.type in ("error", "warning"):
+            self.said.append(f"{message.text} ({message.location['url']})")
 
     def _requested(self, url: str) -> None:
         if not url.startswith((f"{self.url}/", f"blob:{self.url}/")):

@@ -97,6 +97,28 @@ def test_a_scene_is_opened_from_its_card_and_back_leads_to_the_first_screen(
     is_first(page)
 
 
+def test_a_scene_left_before_it_was_loaded_asks_for_nothing(profile: Profile, site: Site) -> None:
+    page = first(profile[0], site)
+    page.locator("#first-shipped a").filter(has_text="two-dof").click()
+    shows(page, "two-dof")
+    page.click("#home")
+    is_first(page)
+    held: list[Any] = []
+    page.route("**/v1/scenes/parameters", lambda route: held.append(route), times=1)
+    page.go_back()
+    expect(page.locator("#scene")).to_have_value("two-dof")
+    until(lambda: page.evaluate("true") and held)
+    # Nothing of it is known yet, and what was said before it is not said of it.
+    expect(page.locator("#live-status")).to_be_empty()
+    page.go_back()
+    is_first(page)
+    with page.expect_response("**/v1/scenes/parameters"):
+        held[0].continue_()
+    page.go_forward()
+    # That the service refused nothing meanwhile is asked of the whole profile.
+    shows(page, "two-dof")
+
+
 def test_other_words_of_an_address_show_a_scene_as_ever(profile: Profile, site: Site) -> None:
     page = profile[0].new_page()
     page.goto(f"{site.url}/?tab=runs")
@@ -171,6 +193,8 @@ def test_a_recent_run_is_shown_and_opened_as_it_was(profile: Profile, site: Site
     page.go_back()
     is_first(page)
     page.get_by_role("link", name="All runs").click()
+    expect(page.locator("#first")).to_be_hidden()
+    expect(page.locator("#runs-table")).to_be_visible()
     expect(page.locator("#runs-table")).to_contain_text("at 90 N")
 
 

@@ -42,7 +42,6 @@ async function scenes() {
     state.scene = known.some(({ name }) => name === FIRST) ? FIRST : known[0].name;
     if (wanted) missing(wanted);
   }
-  byId("scene").value = state.scene;
   sceneList();
 }
 
@@ -54,10 +53,7 @@ function screen(name) {
   byId(name === "first" ? "bar" : "rail").append(byId("foot"));
 }
 
-async function first() {
-  await scenes();
-  await showFirst(sceneNames);
-}
+const first = () => scenes().then(() => showFirst(sceneNames));
 
 // A link of the page is followed within it, in another tab or window as any.
 function follow(event, act) {
@@ -81,6 +77,7 @@ function missing(wanted) {
 }
 
 function sceneList() {
+  byId("scene").value = state.scene;
   show(byId("scene-list"), sceneNames.map((each) => el("li", {}, button(titleOf(each), () => choose(each.name), { "aria-current": each.name === state.scene ? "true" : undefined }))));
 }
 
@@ -90,16 +87,18 @@ async function choose(name) {
   byId("scene-list").querySelector("[aria-current]")?.focus();
 }
 
+// Whether it is still what is wanted, once it is there.
 async function open() {
   screen("scene");
   await learned;
-  if (!(await loadScene(state.scene))) return;
+  if (!(await loadScene(state.scene))) return false;
   const names = variedParts();
   if (!names.includes(state.contact)) Object.assign(state, { contact: names[0] ?? "", variable: "" });
   fillSettings();
   write();
   tell("scene");
   for (const view of STUDIES) resume(view.kind, view);
+  return true;
 }
 
 const forgetAll = () => {
@@ -107,8 +106,6 @@ const forgetAll = () => {
 };
 
 const change = (name) => asOneStep(async () => {
-  screen("scene");
-  byId("scene").value = name;
   forgetAll();
   Object.assign(state, { scene: name, set: {}, contact: "", variable: "", range: null, at: null, jobs: {} });
   write();
@@ -125,17 +122,15 @@ async function restore() {
   if (before !== now) forgetAll();
   read();
   restoreTab();
-  if (before === now) return;
+  if (before === now && !isFirst()) return;
   tell("scene-left");
   if (!state.scene && !location.search) {
     screen("first");
     return first();
   }
   state.scene ||= FIRST;
-  byId("scene").value = state.scene;
   sceneList();
-  await open();
-  tell("values");
+  if (await open()) tell("values");
 }
 
 // A scene that a run brought along, stored under its name or, where that is another's, under one beside it.
@@ -258,6 +253,8 @@ async function begin() {
 }
 
 async function start() {
+  // What is of the scene before hears nobody until the next one is there, whose values it would set.
+  for (const [event, inert] of [["scene-left", true], ["scene", false]]) on(event, () => ["search", "study", "answer", "panel"].forEach((id) => { byId(id).inert = inert; }));
   startTheme();
   startNotices();
   startStrip();

@@ -186,9 +186,9 @@ function drawSensitivities({ peaks, rows, left_out: without, band_hz: band, limi
 }
 
 async function plan() {
-  const mine = (token += 1);
+  const [mine, body] = [(token += 1), asked()];
   try {
-    const found = await patiently(() => post("/v1/plan", asked()));
+    const found = await patiently(() => post("/v1/plan", body));
     if (mine === token) describe(found);
   } catch (error) {
     if (mine === token && error instanceof Problem) show(byId("plan-facts"), el("p", { class: "bad" }, error.message));

@@ -36,9 +36,10 @@ export function startLive() {
     study = found;
     redraw();
   });
-  // The curve of another scene is not shown under the name of this one, whether its own comes or not.
+  // Curve and words of another scene are not shown under the name of this one, whether its own come or not.
   on("scene-left", () => {
-    [latest, study, took] = [null, null, 0];
+    for (const timer of [slow, writing]) clearTimeout(timer);
+    [latest, study, took, byId("live-status").textContent] = [null, null, 0, ""];
     plot.clear(COMES);
   });
   on("scene", () => {
