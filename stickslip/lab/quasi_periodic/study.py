@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import cache, partial
+from itertools import count
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, Field, RootModel
@@ -12,7 +13,7 @@ from pydantic import BaseModel, Field, RootModel
 from optim.criteria.key import Name
 from service.jobs.common.result_models import answered
 from service.jobs.common.scene_requests import LEAST, FrequencyHz, HarmonicRequest, Number, check
-from service.jobs.common.sizes import balance_issues, is_dear_disk
+from service.jobs.common.sizes import balance_issues, coefficients, contact_motions
 from service.jobs.kind_registry import Flag, Json
 from service.jobs.study import Answer, Proposed, Question, Study, Watch, middle_hz, rounded
 from solver.errors import Issue
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
     from solver.results.told import Told
     from solver.scene.scene import Scene
 
-_SIZES = ((7, 90), (5, 60), (3, 40))  # harmonics and turns: of these the first that is not too large
-_APART = 1.3  # the ratio of the frequencies that is proposed: both repeat after ten turns
+_HARMONICS = (7, 5, 3)  # proposed are the first with no more unknowns than
+_UNKNOWNS = 1200
 _RESPONSES = 7  # of long periods, at most as many as that
 
 
@@ -51,7 +52,7 @@ class QuasiPeriodicStudy(Study, HarmonicRequest):
 
     EXAMPLES = ({"scene": "two-dof", "frequency_hz": 1.05, "second_hz": 1.3821, "amplitude": 60},)
     NAME, FUNCTION, RESULT = "quasi-periodic", "solver:quasi_periodic", quasi_periodic_result
-    ASKS = Question("What if two forces act at once?", "engine", 27_000)
+    ASKS = Question("What if two forces act at once?", "engine", 7_000)
     TOLD = "stickslip.lab.quasi_periodic.tables:quasi_periodic"
     SHOWS = "the response to two frequencies ([two base frequencies](transients.md#two-base-frequencies))"
     FIGURE = "stickslip.lab.quasi_periodic.pictures:torus_drawn"
@@ -92,22 +93,28 @@ class QuasiPeriodicStudy(Study, HarmonicRequest):
 
     @classmethod
     def propose(cls, scene: Scene) -> Proposed | str:
-        """A second force as large as half the first, in no ratio of whole numbers to it: both are assumed."""
+        """A second force as large as half the first, with which the motion repeats after 7 turns and 9.
+
+        On a disk it has the engine order by which both forces are one wave of that long period: there is one
+        where turns and sectors have no common divisor. Turns are odd, so that half-waves stay alike.
+        """
         first = next((one for one in scene.excitation if one.amplitude), None)
         if first is None:
             return "The scene has no excitation."
-        middle = middle_hz(scene)
-        # Two forces do not travel round a disk as one wave: every contact of it counts.
-        harmonics, turns = next(
-            pair
-            for pair in _SIZES[is_dear_disk(scene) :]
-            if pair is _SIZES[-1] or not balance_issues("", scene, math.prod(pair), 1)
-        )
+        sectors = scene.structure.sector_count
+        p = next(each for each in count(7, 2) if math.gcd(each, sectors) == 1)
+        q = p + 2
+        turn_hz, motions = rounded(middle_hz(scene) / p, 4), contact_motions(scene)
+        fits = (each for each in _HARMONICS if motions * coefficients(scene, each * q) <= _UNKNOWNS)
+        order = {}
+        if scene.structure.has_sectors:
+            order["engine_order"] = q * pow(p, -1, sectors) * scene.engine_order % sectors
         body = {
-            "frequency_hz": middle, "second_hz": rounded(middle * _APART, 5),
-            "amplitude": rounded(abs(first.amplitude) / 2.0), "harmonics": harmonics, "turns": turns,
+            "frequency_hz": rounded(p * turn_hz, 8), "second_hz": rounded(q * turn_hz, 8),
+            "amplitude": rounded(abs(first.amplitude) / 2.0), "turns": 2 * q,
+            "harmonics": next(fits, _HARMONICS[-1]), **order,
         }  # fmt: skip
-        return Proposed(body, ("second_hz", "amplitude"))
+        return Proposed(body, ("second_hz", "amplitude", *order))
 
     def issues(self, scene: Scene) -> list[Issue]:
         """Return what is wrong with frequencies, force and lengths."""

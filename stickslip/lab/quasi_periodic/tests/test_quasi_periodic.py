@@ -13,8 +13,10 @@ from each import each
 from scipy.integrate import solve_ivp
 
 import solver
+from service.jobs.study import Proposed
 from solver.errors import SettingError
 from stickslip.lab.quasi_periodic.quasi_periodic_result import QuasiPeriodic, QuasiPeriodicStatus
+from stickslip.lab.quasi_periodic.study import QuasiPeriodicStudy
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import Scene
 
@@ -189,6 +191,24 @@ def test_two_engine_orders_of_a_disk_are_those_of_the_whole_annulus() -> None:
     ]
     known = solver.march(Scene.from_dict(whole), frequency_hz=f1 / 3.0, tolerance=1e-6)
     assert found.half_peak_to_peak == pytest.approx(known.half_peak_to_peak, rel=5e-4)
+
+
+@pytest.mark.parametrize("sectors", [2, 7, 8, 21, 24, 63, 77, 693])
+def test_the_proposal_repeats_soon_on_any_disk(sectors: int) -> None:
+    raw = solver.load_scene("bladed-disk").to_dict()
+    raw["structure"]["sectors"] = sectors
+    order = raw["excitation"]["engine_order"] = sectors // 3
+    scene = Scene.from_dict(raw)
+    told = QuasiPeriodicStudy.propose(scene)
+    assert isinstance(told, Proposed)
+    found = solver.quasi_periodic(scene, **{**told.body, "harmonics": 1})
+    assert found.reached
+    assert found.repeats
+    ((p, q),) = found.turns
+    assert q == p + 2 < 20
+    # Some wave of the long period is both.
+    both = (order, told.body["engine_order"])
+    assert both in {(p * each % sectors, q * each % sectors) for each in range(sectors)}
 
 
 @pytest.mark.long
