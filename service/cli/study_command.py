@@ -20,7 +20,7 @@ from service.cli.options.parameters import keyword, with_parameters
 from service.cli.progress import bar
 from service.errors import InputError
 from service.jobs.study import Answer, Study, Watch, Writable
-from service.rendering.text import show
+from service.rendering.text import print_json, print_told, told
 from solver.errors import SettingError
 from solver.first_use import on_demand
 from solver.jit.compiler_process import cost, prepare
@@ -189,5 +189,8 @@ def give(study: type[Study], answer: Answer, outputs: Outputs, scene: Scene, *, 
         outputs.write(answer.result, draw, scene=scene)
     elif answer.reached and outputs.file is not None:
         raise InputError(f"`--out`: what `{study.NAME}` finds is no table, take --json")
-    show(study.NAME, answer.json, study.tell(), as_json=as_json)
+    if as_json:
+        print_json(answer.json)
+    else:
+        print_told(told(study.NAME, answer.json, study.tell()))
     end(answer.reached, answer.status)

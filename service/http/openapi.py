@@ -223,7 +223,7 @@ _OF: dict[tuple[str, str], tuple[str, ...]] = {
     ),
     ("get", "/v1/sweeps/{sweep_id}"): ("NotAcceptable", "InvalidQuery"),
     ("delete", "/v1/jobs/{job_id}"): ("Conflict",),
-    ("get", "/v1/jobs/{job_id}/results"): ("Conflict", "JobFailed"),
+    **{("get", f"/v1/jobs/{{job_id}}/{name}"): ("Conflict", "JobFailed") for name in ("results", "told")},
     ("post", "/v1/projects"): (*_BODY, "StorageFull"),
     ("patch", "/v1/projects/{project_id}"): (*_BODY, "Conflict", "ChangedMeanwhile"),
     ("post", "/v1/projects/{project_id}/restore"): ("Conflict",),

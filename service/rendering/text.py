@@ -28,14 +28,6 @@ def print_json(obj: Mapping[str, object]) -> None:
     sys.stdout.write(json.dumps(obj, allow_nan=False, ensure_ascii=False) + "\n")
 
 
-def show(kind: str, answer: Json, tell: Tell | None, *, as_json: bool) -> None:
-    """Print what was computed: one JSON object, or what is told of it."""
-    if as_json:
-        print_json(answer)
-    else:
-        print_told(told(kind, answer, tell))
-
-
 def say(text: str) -> None:
     """Print a line."""
     sys.stdout.write(text + "\n")

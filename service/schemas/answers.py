@@ -19,6 +19,7 @@ from service.db.repositories import JobRow, ResultRepository
 from service.jobs.stored_figures import DESIGN, SWEEP, DesignRecord, Quantity, StoredRecord, SweepRecord
 from service.settings.settings import Settings
 from solver.contacts.laws.law_registry import DEFAULT, laws
+from solver.results.told import ResultTable, Summary
 from solver.scene.json_schema import scene_schema
 from solver.scene.toml import shipped_text
 
@@ -236,6 +237,12 @@ class ResultsAnswer(ResultsHead):
         """The answer for the results of a job."""
         sweeps = [SweepAnswer.of(one) for one in results.sweeps]
         return cls(job=results.job.id, status=results.job.state, result=results.result, sweeps=sweeps)
+
+
+class ToldAnswer(AnswerModel):
+    """What people read of a result, as the command prints it: names with their values, and tables."""
+
+    blocks: list[Summary | ResultTable]
 
 
 class VariableAnswer(AnswerModel):

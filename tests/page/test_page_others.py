@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from typing import TYPE_CHECKING
 
 import httpx
@@ -32,7 +33,7 @@ def test_a_kind_without_a_view_has_a_form_and_a_result(browser: Browser, site: S
         expect(page.locator("#ask-distortion-status")).to_contain_text("✓", timeout=60_000)
         [job] = httpx.get(f"{site.url}/v1/jobs?kind=distortion").json()["items"]
         found = httpx.get(f"{site.url}/v1/jobs/{job['id']}/results").json()["result"]
-        expect(page.locator("#ask-distortion-result")).to_contain_text(f"{found['worst']:.6f}"[:7])
+        expect(page.locator("#ask-distortion-result")).to_contain_text(f"{found['worst']:.4g}")
         assert f"distortion={job['id']}" in page.url
         page.reload()
         expect(page.locator("#ask-distortion-status")).to_contain_text("✓")
@@ -56,6 +57,12 @@ def test_studies_are_questions_that_are_filled_in(browser: Browser, site: Site) 
         page.click("#ask-margin-submit")
         expect(page.locator("#ask-margin-status")).to_contain_text("✓")
         expect(page.locator("#ask-margin-result svg.chart")).to_have_count(2)
+        page.get_by_role("group", name="Questions about").get_by_role("button", name="Engine").click()
+        page.click("#ask-quasi-periodic-submit")
+        answer = page.locator("#ask-quasi-periodic-result")
+        expect(answer).to_contain_text(re.compile(r"max\|x\|[\d.]+ m"))
+        for key in ("max_abs", "second_hz", "e-"):
+            expect(answer).not_to_contain_text(key)
         page.get_by_role("group", name="Questions about").get_by_role("button", name="Rig").click()
         expect(page.locator("#ask-posterior-submit")).to_have_text("Choose measurements…")
         page.click("#ask-posterior-submit")

@@ -17,6 +17,7 @@ from service.db import revisions
 from service.db.models import JobState
 from service.errors import QueueFullError, ServiceProblem
 from service.schemas.problems import service_problem
+from solver.results.units import quantity
 
 SLOW = {"kind": "iteration", "seconds": 60.0}
 
@@ -80,6 +81,35 @@ def test_dismiss(http: httpx.Client) -> None:
     promptly(trial, 1.0)
     done = http.post("/v1/jobs", json={"kind": "iteration"}, headers={"Prefer": "wait=20"}).json()
     is_problem(http.delete(done["links"]["self"]), 409)
+
+
+def test_what_people_read_of_a_result_is_what_the_command_prints(shipped: httpx.Client) -> None:
+    body = {"kind": "margin", "scene": "bladed-disk", "from": 20, "to": 80, "limit": 1.5e-4, "points": 3}
+    done = shipped.post("/v1/jobs", json={**body, "harmonics": 3}, headers={"Prefer": "wait=60"}).json()
+    head, allowed, amplitudes, _shares = shipped.get(f"{done['links']['self']}/told").json()["blocks"]
+    assert head["title"] == "bladed-disk, excitation from 20 to 80 N, 3 harmonics"
+    assert "time" in dict(head["pairs"])
+    [one] = done["result"]["allowed"]
+    row = ["as it is", quantity(one["allowed"], "N"), "tip", quantity(one["at_hz"], "Hz"), "0.15 mm"]
+    assert allowed["rows"] == [row]
+    assert amplitudes["title"] == "amplitude [mm]"
+    [sizes] = done["result"]["stress"]
+    assert [float(cell) for _, cell in amplitudes["rows"]] == pytest.approx(
+        [1e3 * size for size in sizes], rel=1e-3
+    )
+
+
+def test_of_what_has_no_result_there_is_nothing_to_read(http: httpx.Client) -> None:
+    job = http.post("/v1/jobs", json={**SLOW, "fresh": True}).json()
+    is_problem(http.get(f"{job['links']['self']}/told"), 409)
+    http.delete(job["links"]["self"])
+    failed = http.post("/v1/jobs", json={"kind": "bad-scene"}, headers={"Prefer": "wait=20"}).json()
+    told = is_problem(http.get(f"{failed['links']['self']}/told"), 409)
+    assert told["type"] == "urn:stickslip:problem:job-failed"
+    # Of a kind that says nothing of its results the keys are told.
+    done = http.post("/v1/jobs", json={"kind": "iteration"}, headers={"Prefer": "wait=20"}).json()
+    [block] = http.get(f"{done['links']['self']}/told").json()["blocks"]
+    assert "eigenvalue" in dict(block["pairs"])
 
 
 def test_a_failed_job_says_why(http: httpx.Client) -> None:

@@ -56,6 +56,7 @@ TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
     "POST /v1/jobs": (MADE, {"kind": "iteration", "fresh": True, "seconds": 0.1}),
     "GET /v1/jobs/{job_id}": (OWNED, None),
     "GET /v1/jobs/{job_id}/results": (OWNED, None),
+    "GET /v1/jobs/{job_id}/told": (OWNED, None),
     # They have no results that a report tells either.
     "GET /v1/jobs/{job_id}/report": ((401, 401, 404, 401, 401, 403, 409, 409), None),
     # The jobs of these tests have no scene, as is said to those who may see them.

@@ -74,7 +74,7 @@ def shares(found: Mapping[str, Any]) -> Iterator[Block]:
     rows = [
         (
             row["path"],
-            f"{number(row['value'], 6)} {row['unit']}".rstrip(),
+            quantity(row["value"], row["unit"]),
             *(_share(share) for share in row["peaks_percent"]),
             _share(row["band_percent"]),
         )

@@ -31,20 +31,8 @@ from service.http.in_lane import prepared, reading
 from service.http.made_once import LargeAnswers
 from service.jobs.kind_registry import KIND, JobRequest, Json, Registry, asked_of
 from service.jobs.kinds.bodies import DESIGN, any_body, design_body, examples, examples_of
-from service.queue.core import Service
-from service.schemas.answers import (
-    Cursor,
-    FinishedJob,
-    JobAnswer,
-    JobPage,
-    JobScene,
-    Limit,
-    ListQuery,
-    ResultsAnswer,
-    ResultsHead,
-    SweepAnswer,
-    newest,
-)
+from service.queue.core import Results, Service
+from service.schemas import answers
 
 router = APIRouter(prefix="/v1", tags=["jobs"])
 
@@ -55,15 +43,15 @@ _SUBMITTED: dict[str, Any] = {
     "response_model": None,
     "responses": {
         200: {
-            "model": FinishedJob,
+            "model": answers.FinishedJob,
             "description": "The job has ended: `Prefer: wait=N`, or a stored result.",
         },
-        202: {"model": JobAnswer, "description": "The job was accepted, `Location` is where it is."},
+        202: {"model": answers.JobAnswer, "description": "The job was accepted, `Location` is where it is."},
     },
 }
 
 
-class JobQuery(ListQuery):
+class JobQuery(answers.ListQuery):
     """Which jobs to list."""
 
     path: ClassVar[str] = "/v1/jobs"
@@ -71,22 +59,23 @@ class JobQuery(ListQuery):
     status: JobState | None = None
     kind: str | None = Field(default=None, max_length=32)
     scene: str | None = Field(default=None, max_length=200)
-    limit: Limit = 100
-    cursor: Cursor = None
+    limit: answers.Limit = 100
+    cursor: answers.Cursor = None
 
 
-@router.get("/jobs", response_model=JobPage, responses=LISTED)
+@router.get("/jobs", response_model=answers.JobPage, responses=LISTED)
 @reading
 def list_jobs(context: InContext, query: Annotated[JobQuery, Query()]) -> Response:
     """Jobs, newest first."""
     found = partial(
         context.service.jobs.page, owner=context.sees, state=query.status, kind=query.kind, scene=query.scene
     )
-    rows, following = newest(query, context.service.settings, found)
-    return listing(context, JobPage(items=[_answer(context.service, row) for row in rows], next=following))
+    rows, following = answers.newest(query, context.service.settings, found)
+    items = [_answer(context.service, row) for row in rows]
+    return listing(context, answers.JobPage(items=items, next=following))
 
 
-@router.get("/jobs/{job_id}", response_model=JobAnswer)
+@router.get("/jobs/{job_id}", response_model=answers.JobAnswer)
 @reading
 def get_job(job_id: str, context: InContext) -> Response:
     """A job."""
@@ -94,7 +83,7 @@ def get_job(job_id: str, context: InContext) -> Response:
 
 
 @router.delete("/jobs/{job_id}")
-async def dismiss(job_id: str, context: InContext) -> JobAnswer:
+async def dismiss(job_id: str, context: InContext) -> answers.JobAnswer:
     """Dismiss a job. A running one is stopped within the grace; the answer waits for that."""
     service, caller = context.service, context.caller
     row = await service.lanes.writes.run(caller.owner, service.dismiss, job_id, caller)
@@ -104,21 +93,36 @@ async def dismiss(job_id: str, context: InContext) -> JobAnswer:
     return _answer(service, row)
 
 
-@router.get("/jobs/{job_id}/scene", response_model=JobScene)
+@router.get("/jobs/{job_id}/scene", response_model=answers.JobScene)
 @reading
 def scene_of(job_id: str, context: InContext) -> Response:
     """The scene of a job as it is computed: with its values set, and what its uploads held.
 
     It stays what it was when the stored scene or the upload it was made of is replaced or deleted.
     """
-    return as_json(JobScene(job=job_id, scene=context.service.scene_of(job_id, context.caller)))
+    return as_json(answers.JobScene(job=job_id, scene=context.service.scene_of(job_id, context.caller)))
 
 
-@router.get("/jobs/{job_id}/results", response_model=ResultsAnswer)
+@router.get("/jobs/{job_id}/results", response_model=answers.ResultsAnswer)
 @reading
 def results(job_id: str, context: InContext) -> Response:
     """What a job computed."""
     return results_answer(context, job_id, context.caller)
+
+
+@router.get("/jobs/{job_id}/told", response_model=answers.ToldAnswer)
+@reading
+def told(job_id: str, context: InContext) -> Response:
+    """What people read of what a job computed: numbers with their units, of every kind."""
+    return as_json(told_answer(context.service, context.service.results(job_id, context.caller)))
+
+
+def told_answer(service: Service, found: Results) -> answers.ToldAnswer:
+    """What people read of a result."""
+    from service.rendering.text import told
+
+    tell = service.registry.tell_of(found.job.kind)
+    return answers.ToldAnswer(blocks=list(told(found.job.kind, found.result, tell)))
 
 
 def results_answer(context: Context, job_id: str, caller: Caller) -> Response:
@@ -129,8 +133,8 @@ def results_answer(context: Context, job_id: str, caller: Caller) -> Response:
     def body() -> bytes:
         with service.database.reading():
             found = service.results(job_id, caller)
-            sweeps = [SweepAnswer.of(one) for one in found.sweeps]
-        about = ResultsHead(job=found.job.id, status=found.job.state)
+            sweeps = [answers.SweepAnswer.of(one) for one in found.sweeps]
+        about = answers.ResultsHead(job=found.job.id, status=found.job.state)
         return with_raw(about, result=found.text.encode(), sweeps=raw_list(sweeps))
 
     large: LargeAnswers = context.request.app.state.large
@@ -198,11 +202,11 @@ def _job_or_result(service: Service, headers: Mapping[str, str], row: JobRow) ->
     with service.database.reading():
         source = row.result_of or row.id
         text = service.jobs.result_text(source)
-        sweeps = [SweepAnswer.of(one) for one in service.stored.of_job(source)]
+        sweeps = [answers.SweepAnswer.of(one) for one in service.stored.of_job(source)]
     result = b"null" if text is None else text.encode()
-    body = with_raw(JobAnswer.of(row), result=result, sweeps=raw_list(sweeps))
+    body = with_raw(answers.JobAnswer.of(row), result=result, sweeps=raw_list(sweeps))
     return Response(body, 200, headers, "application/json")
 
 
-def _answer(service: Service, row: JobRow) -> JobAnswer:
-    return JobAnswer.of(row, None if row.state.finished else service.queue.live(row.id))
+def _answer(service: Service, row: JobRow) -> answers.JobAnswer:
+    return answers.JobAnswer.of(row, None if row.state.finished else service.queue.live(row.id))

@@ -7,7 +7,7 @@ from typing import Any
 
 from solver.results.known import Measured, known_pairs
 from solver.results.told import Block, ResultTable, Summary
-from solver.results.units import duration, hertz, length, number, quantity, span
+from solver.results.units import duration, hertz, length, number, quantity, shown_unit, span
 from solver.scene.parameter_paths import parameter
 from solver.views.tables.responses import proved, title_over
 
@@ -83,21 +83,21 @@ def margin(found: Json) -> Iterator[Block]:
     ]  # fmt: skip
     yield ResultTable("Excitation allowed", ("damper", "allowed", "by", "at", what), allowed)
     names = [one["name"] for one in found["allowed"]]
-    for key, title in (("stress", f"{what} [{found['unit']}]"), ("used", "share of what is allowed")):
+    sizes = (abs(one or 0.0) for row in found["stress"] for one in row)
+    shown = shown_unit(max(sizes, default=0.0), found["unit"])
+    of_stress = ("stress", f"{what} [{shown.name}]", shown.per_one)
+    for key, title, per_one in (of_stress, ("used", "share of what is allowed", 1.0)):
         rows = [
             (
                 number(each),
                 *(
-                    number(one)
-                    if one is not None
-                    else "infinite"
-                    if key == "used" and (d, i) in endless
-                    else "–"
+                    number(per_one * one) if one is not None
+                    else "infinite" if key == "used" and (d, i) in endless else "–"
                     for d, one in enumerate(row)
                 ),
             )
             for i, (each, *row) in enumerate(zip(level, *found[key], strict=True))
-        ]
+        ]  # fmt: skip
         yield ResultTable(title, (f"excitation [{unit}]", *names), rows)
 
 

@@ -39,12 +39,8 @@ def quasi_periodic(found: Json) -> Iterator[Block]:
             (f"amplitude at {second} Hz", units.length(found["second_amplitude"])),
         ]
         if found["error_estimate"] is not None:
-            pairs.append(
-                (
-                    "estimated error",
-                    f"{units.number(found['error_estimate'] / found['half_peak_to_peak'], 2)} of it",
-                )
-            )
+            share = found["error_estimate"] / found["half_peak_to_peak"]
+            pairs.append(("estimated error", f"{units.number(100.0 * share, 2)} %"))
         between = " and ".join(f"{p} : {q}" for p, q in found["turns"])
         pairs.append(("repeats after turns" if found["repeats"] else "between turns", between))
     pairs += [(name, state) for name, state in found["contacts"].items()]

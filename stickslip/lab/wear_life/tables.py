@@ -60,7 +60,7 @@ def wear_life(found: Json) -> Iterator[Block]:
             )
             for name, depth, load, power in zip(*of_each, strict=True)
         ]  # fmt: skip
-        heads = ("contact", "depth", "load at first", "at last", "power at first", "at last")
+        heads = ("contact", "depth", "N0 at first", "at last", "power at first", "at last")
         yield ResultTable("Contacts", heads, rows)
     if found["paths"]:
         columns = [found[f"{name}_slopes"] for name in ("end", "highest", "limit", "margin")]

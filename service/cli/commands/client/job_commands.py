@@ -210,13 +210,8 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
 
     print_told(told(job.kind, answer.result, registry_here().tell_of(job.kind)))
     rows = [
-        (
-            sweep.id,
-            sweep.parameter,
-            str(sweep.points),
-            "" if sweep.peak is None else units.number(sweep.peak.value),
-        )
-        for sweep in answer.sweeps
+        (one.id, one.parameter, str(one.points), "" if one.peak is None else units.number(one.peak.value))
+        for one in answer.sweeps
     ]
     if rows:
         print_table("Stored sweeps", ("id", "parameter", "points", "peak [m]"), rows)

@@ -2,12 +2,13 @@
 // press. One that has a view of its own opens that; of any other the result stands in its card, as drawings and a table.
 
 import { on, state, tell } from "../base/state.js";
-import { button, byId, details, el, facts, note, numeric, say, scrolledTable, show, svg, titled } from "../base/dom.js";
+import { button, byId, el, facts, note, numeric, say, scrolledTable, show, svg, titled } from "../base/dom.js";
 import { saveText } from "../base/exports.js";
-import { notes, number, quantity, unitOf, when } from "../base/format.js";
+import { quantity, unitOf, when } from "../base/format.js";
 import { chart } from "../charts/chart.js";
 import { schemaForm } from "../forms/form.js";
 import { tables } from "../identify/data.js";
+import { patiently, request } from "../network/api.js";
 import { resume, run } from "../network/jobs.js";
 import { askedFor, barRange, kindNames, kindOf, ofTheBar, proposalOf, refusedFor, takes } from "../scene/kinds.js";
 import { variable } from "../scene/scenes.js";
@@ -139,39 +140,30 @@ export function showOther(kind) {
   return resume(kind, { ...beside(kind), submitted: (job) => fill(kind, job.request) });
 }
 
-const plain = (value) => (Array.isArray(value) ? !value.some((one) => typeof one === "object") : typeof value !== "object");
-
-// Any study without a view of its own, by its name.
+// Any study without a view of its own, by its name: its drawings, and what people read of it.
 const otherView = (kind) => Object.assign(view({ id: `ask-${kind}`, goes: () => "" }), {
   say: () => undefined,
   waiting: () => show(byId(`ask-${kind}-result`)),
   failed: () => undefined,
-  result(result) {
+  async result(result, _sweeps, { id }) {
+    const { blocks } = await patiently(() => request(`/v1/jobs/${id}/told`));
     const drawings = viewOf(kind)?.drawings(result) ?? [];
     const figures = drawings.map(() => el("div", { class: "figure" }));
     byId(`ask-${kind}`).classList.add("is-open");
-    show(byId(`ask-${kind}-result`), ...drawings.map(({ label }, i) => titled(label, figures[i])), facts([...scalars(result), ...notes({ notes: result.notes })]), columns(result),
+    show(byId(`ask-${kind}-result`), ...drawings.map(({ label }, i) => titled(label, figures[i])), blocks.map(told),
       button("Save as JSON", () => saveText(JSON.stringify(result, null, 1), `${kind}.json`, "application/json")));
     // Drawn where they stand: a chart is as wide as its place.
     drawings.forEach(({ label, file, draw }, i) => chart(figures[i], { label, file }).draw(draw));
   },
 });
 
-const worded = (value) => (typeof value === "number" ? number(value, 6) : value === null ? "–" : typeof value === "boolean" ? (value ? "yes" : "no") : String(value));
+const isNumber = (text) => /^[≤≥±\s]*[-+−]?\d/.test(text);
 
-function scalars(item, before = "") {
-  return Object.entries(item).flatMap(([key, value]) => {
-    if (Array.isArray(value)) return plain(value) && value.length <= 6 ? [[before + key, value.map(worded).join(", ")]] : [[before + key, `${value.length} values`]];
-    return value !== null && typeof value === "object" ? scalars(value, `${before}${key}.`) : [[before + key, worded(value)]];
-  });
-}
-
-// Lists of numbers of the same length, side by side.
-function columns(result) {
-  const lists = Object.entries(result).filter(([, value]) => Array.isArray(value) && value.length > 6 && value.every((one) => one === null || typeof one === "number"));
-  const longest = Math.max(0, ...lists.map(([, value]) => value.length));
-  const same = lists.filter(([, value]) => value.length === longest);
-  if (!same.length) return null;
-  const rows = Array.from({ length: Math.min(longest, ROWS) }, (_, i) => same.map(([, value]) => numeric(worded(value[i]))));
-  return details(`Numbers${longest > ROWS ? `, the first ${ROWS}` : ""}`, scrolledTable("Numbers of the result", same.map(([name]) => numeric(name)), rows, { caption: "Numbers" }));
+// Names with their values, or a table whose columns of numbers stand to the right.
+function told({ title, pairs, columns, rows }) {
+  const heading = title ? el("h3", {}, title) : null;
+  if (pairs) return [heading, facts(pairs)];
+  const right = columns.map((_, i) => rows.some((row) => row[i]) && rows.every((row) => !row[i] || isNumber(row[i])));
+  const cells = (row) => row.map((text, i) => (right[i] ? numeric(text) : text));
+  return [heading, scrolledTable(title || "Numbers", cells(columns), rows.slice(0, ROWS).map(cells), { more: rows.length > ROWS ? `The first ${ROWS} of ${rows.length} rows.` : "" })];
 }
