@@ -33,7 +33,7 @@ def test_a_kind_without_a_view_has_a_form_and_a_result(browser: Browser, site: S
         expect(page.locator("#ask-distortion-status")).to_contain_text("✓", timeout=60_000)
         [job] = httpx.get(f"{site.url}/v1/jobs?kind=distortion").json()["items"]
         found = httpx.get(f"{site.url}/v1/jobs/{job['id']}/results").json()["result"]
-        expect(page.locator("#ask-distortion-result")).to_contain_text(f"{found['worst']:.4g}")
+        expect(page.locator("#ask-distortion-result")).to_contain_text(f"{100 * found['worst']:.3f} %")
         assert f"distortion={job['id']}" in page.url
         page.reload()
         expect(page.locator("#ask-distortion-status")).to_contain_text("✓")
@@ -104,7 +104,7 @@ STUDIES = {
             "scene": "two-dof", "hours": 1e-4, "coefficient": {"damper": 1e-11}, "area": {"damper": 2e-4},
             "load_loss_per_depth": {"damper": 4e6}, "limit": 2.36, "harmonics": 3, "points": 9,
         },
-        {"Amplitude over the life": "limit", "Loads over the life": "normal load [N]",
+        {"Amplitude over the life": "limit", "Loads over the life": "N0 [N]",
          "Depths over the life": "wear depth"},
     ),
     "worst-mistuning": (

@@ -42,6 +42,6 @@ def wear_life_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
             worn.plot(hours, deep * depth.per_one)
         loads.legend()
         style.label(response, "running time [h]", measured.label("", length))
-        style.label(loads, "running time [h]", "normal load [N]")
+        style.label(loads, "running time [h]", "N0 [N]")
         style.label(worn, "running time [h]", f"depth [{depth.name}]")
     return page

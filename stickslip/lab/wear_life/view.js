@@ -21,12 +21,12 @@ function drawn(result) {
         series: [{ x: result.hours, y: result.amplitude.map(times(height.factor)), colour: 1 }],
         limits: [
           ...(result.limit === null ? [] : [{ y: result.limit * height.factor, name: "limit" }]),
-          ...result.switches.map((at) => ({ x: at, name: "another peak" })),
+          ...result.switches.map((at, i) => ({ x: at, name: i ? "" : "another peak" })),
         ],
         marks: result.hours_to_limit === null ? [] : [{ x: result.hours_to_limit, y: result.limit * height.factor, text: `${number(result.hours_to_limit, 4)} h` }],
       },
     },
-    ...(known(result.loads).length ? [one("Loads over the life", "wear-loads", "normal load [N]", result.loads, 1)] : []),
+    ...(known(result.loads).length ? [one("Loads over the life", "wear-loads", "N0 [N]", result.loads, 1)] : []),
     ...(known(result.used ?? []).length ? [{
       label: "Share of the stress allowed", file: "wear-used",
       draw: {

@@ -2,7 +2,7 @@
 
 const UNIT = /\[([^\]]+)\]/;
 // A unit that the name of a key ends with is said beside its field.
-const SUFFIXES = { _hz: "Hz", _rpm: "1/min" };
+const SUFFIXES = { _hz: "Hz", _rpm: "1/min", _hz_per_s: "Hz/s" };
 // A bound that stands for 0, which is out.
 const TINY = 1e-6;
 const RANGE = /^\s*(\S+?)\s*(?:to|–|…|:)\s*(\S+)\s*$/;
