@@ -77,6 +77,7 @@ async function follow(kind, id, view, signal) {
   if (signal.aborted) return false;
   if (results) {
     await view.result(results.result, results.sweeps, { ...job, request: first.request });
+    if (signal.aborted) return false;
     tell("computed", { kind, request: first.request, result: results.result });
   }
   if (job.status === "failed") view.failed(job.error?.detail ?? "The job failed.", job.error?.issues ?? [], results ? null : job);
