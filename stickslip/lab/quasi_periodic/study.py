@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from solver.results.told import Told
     from solver.scene.scene import Scene
 
-_HARMONICS = (7, 5, 3)  # proposed are the first with no more unknowns than
+_HARMONICS = (11, 7, 5, 3)  # proposed are the first with no more unknowns than
 _UNKNOWNS = 1200
 _RESPONSES = 7  # of long periods, at most as many as that
 
