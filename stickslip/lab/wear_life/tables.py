@@ -80,7 +80,7 @@ def _chosen(found: Json | None) -> list[tuple[str, str]]:
         return [("chosen", found["status"])]
     worst = f"{length(found['worst'])} at worst, {length(found['first'])} when new"
     return [
-        (found["parameter"], f"{number(found['at'], 6)} {found['unit']}".rstrip()),
+        (found["parameter"], quantity(found["at"], found["unit"])),
         ("chosen", worst),
     ]
 
