@@ -8,6 +8,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any, TypedDict
 from urllib.parse import quote, urlencode
 
+from solver.results.units import length
 from solver.views.plots.html import pairs
 
 if TYPE_CHECKING:
@@ -104,8 +105,8 @@ def shared_page(run: SharedRun, found: Sequence[Block], sweeps: Sequence[SweepAn
         parts.append(block_html(block))
     parts += ["<h2>What was asked</h2>", pairs(by_keys(run.request or {}))]
     if sweeps:
-        rows = [[one.parameter, one.points, one.peak and one.peak.value] for one in sweeps]
-        parts += ["<h2>Stored sweeps</h2>", table(["over", "points", "peak [m]"], rows)]
+        rows = [[one.parameter, one.points, one.peak and length(one.peak.value)] for one in sweeps]
+        parts += ["<h2>Stored sweeps</h2>", table(["over", "points", "peak"], rows)]
     parts += [f"<h2>Files</h2><ul>{''.join(_files(run, bool(found), sweeps, token))}</ul>"]
     return page(title, "\n".join(parts))
 

@@ -36,6 +36,8 @@ def test_a_run_is_named_found_compared_and_thrown_away(
     assert told("runs", "change", runs[0], "--tag", "")["tags"] == []
     compared = said("runs", "compare", *runs)
     assert [line.split() for line in compared.splitlines() if "size" in line] == [["size", "7", "8"]]
+    [eigenvalue] = [line.split() for line in compared.splitlines() if "eigenvalue" in line]
+    assert len(eigenvalue) == 3
     link = said("runs", "share", runs[0], "--days", "1").strip()
     assert httpx.get(link).json()["name"] == "small"
     assert "is in the bin" in said("runs", "delete", runs[0])
@@ -47,3 +49,17 @@ def test_a_run_is_named_found_compared_and_thrown_away(
     assert "give what is to be changed: --name" in capsys.readouterr().err
     assert main(["runs", "delete", "none", *url]) != 0
     assert "there is no run 'none'" in capsys.readouterr().err
+
+
+def test_what_is_compared_has_its_units(shipped: httpx.Client, capsys: pytest.CaptureFixture[str]) -> None:
+    body = {"kind": "sweep", "scene": "bladed-disk", "harmonics": 3}
+    runs = [
+        shipped.post("/v1/jobs", json={**body, "set": {"shroud.N0": load}}, headers={"Prefer": "wait=60"})
+        for load in (150.0, 250.0)
+    ]
+    ids = [run.json()["id"] for run in runs]
+    assert main(["runs", "compare", *ids, "--url", str(shipped.base_url)]) == 0
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert ["shroud.N0", "150", "N", "250", "N"] in lines
+    [peak] = [line for line in lines if line[:1] == ["peak"]]
+    assert peak.count("mm") == peak.count("Hz") == 2

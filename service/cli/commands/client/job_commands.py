@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from service.client.client import Client
     from service.rendering.report.sections import Designed
     from service.schemas.answers import AnswerModel, JobAnswer, ResultsAnswer
+    from solver.results.told import Block
 
 
 MOST = 50
@@ -122,6 +123,14 @@ def tell(answer: AnswerModel, words: str, *, as_json: bool) -> None:
         say(words)
 
 
+def told_here(kind: str, result: Mapping[str, Any]) -> Sequence[Block]:
+    """What people read of a result of a kind that this program knows; of another one its keys."""
+    # Loaded here: it brings every kind along.
+    from service.settings.kinds import registry_here
+
+    return told(kind, result, registry_here().tell_of(kind))
+
+
 _INPUT_FAILURES = ("scene", "setting")
 
 
@@ -137,19 +146,13 @@ def results(
     job: Annotated[
         str | None, typer.Argument(metavar="[JOB]", help="Id of a job; the stored designs if left out.")
     ] = None,
-    scene: OfScene = None,
-    variable: OfVariable = None,
-    peak_max: PeakMax = None,
-    band_max: BandMax = None,
-    reached: Reached = None,
-    sort: Sort = None,
-    limit: Most = None,
+    scene: OfScene = None, variable: OfVariable = None, peak_max: PeakMax = None, band_max: BandMax = None,
+    reached: Reached = None, sort: Sort = None, limit: Most = None,
     out: Annotated[
         str | None, typer.Option("--out", metavar="F", help="Also write the JSON object to a file.")
     ] = None,
-    plot: options.Plot = None,
-    as_json: options.Json = False,
-) -> None:
+    plot: options.Plot = None, as_json: options.Json = False,
+) -> None:  # fmt: skip
     """Print what a job computed, or list the stored designs."""
     from solver.views.plots import SUFFIXES
 
@@ -205,16 +208,13 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
     if as_json:
         print_json(answer.model_dump(mode="json"))
         return
-    # Loaded here: it brings every kind along.
-    from service.settings.kinds import registry_here
-
-    print_told(told(job.kind, answer.result, registry_here().tell_of(job.kind)))
+    print_told(told_here(job.kind, answer.result))
     rows = [
-        (one.id, one.parameter, str(one.points), "" if one.peak is None else units.number(one.peak.value))
+        (one.id, one.parameter, str(one.points), "" if one.peak is None else units.length(one.peak.value))
         for one in answer.sweeps
     ]
     if rows:
-        print_table("Stored sweeps", ("id", "parameter", "points", "peak [m]"), rows)
+        print_table("Stored sweeps", ("id", "parameter", "points", "peak"), rows)
     say(f"job {job.id}")
 
 

@@ -6,15 +6,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.commands.client.job_commands import MOST, listed, tell, tell_list
+from service.cli.commands.client.job_commands import MOST, listed, tell, tell_list, told_here
 from service.cli.options import parameters as options
 from service.cli.options.inputs import amount, count
+from service.db.models import JobState
 from service.errors import InputError
 from service.rendering.text import print_json, print_table, say
-from solver.results import units
+from solver.scene.parameter_paths import parameter
 
 if TYPE_CHECKING:
     from service.client.client import Client
+    from service.schemas.workbench_answers import RunAnswer
 
 OfProject = Annotated[
     str | None, typer.Option("--project", metavar="ID", help="Id of a project, as `projects list` shows it.")
@@ -45,15 +47,9 @@ def given_of(**changes: Any) -> dict[str, Any]:
 
 
 def show(
-    client: Client,
-    project: OfProject = None,
-    tag: Tags = None,
-    text: Text = None,
-    status: States = None,
-    deleted: Binned = False,
-    limit: Count = None,
-    as_json: options.Json = False,
-) -> None:
+    client: Client, project: OfProject = None, tag: Tags = None, text: Text = None, status: States = None,
+    deleted: Binned = False, limit: Count = None, as_json: options.Json = False,
+) -> None:  # fmt: skip
     """List the runs, newest first."""
     filters = {"project": project, "tag": tag, "text": text, "status": status, "deleted": deleted}
     found = listed(client.runs, limit, **filters)
@@ -100,19 +96,20 @@ def restore(client: Client, run: options.Job, as_json: options.Json = False) -> 
 def compare(client: Client, a: First, b: Second, as_json: options.Json = False) -> None:
     """Say what differs between two runs.
 
-    Their inputs as they were computed, and the main figures of their results.
+    Their inputs as they were computed, and what people read of their results.
     """
     found = client.compare(a, b)
     if as_json:
         print_json(found.model_dump(mode="json"))
         return
     heads = (found.a.name or "A", found.b.name or "B")
-    inputs = [(one.path, _word(one.a), _word(one.b)) for one in found.inputs]
+    inputs = [(one.path, _word(one.path, one.a), _word(one.path, one.b)) for one in found.inputs]
     print_table("Inputs that differ", ("input", *heads), inputs)
     if found.more_inputs:
         say(f"and {found.more_inputs} more")
-    figures = [(one.name, _word(one.a), _word(one.b)) for one in found.results]
-    print_table("Results", ("figure", *heads), figures)
+    a_told, b_told = _told(client, found.a), _told(client, found.b)
+    results = [(name, a_told.get(name, ""), b_told.get(name, "")) for name in {**a_told, **b_told}]
+    print_table("Results", ("", *heads), results)
 
 
 def share(client: Client, run: options.Job, days: Days = None, as_json: options.Json = False) -> None:
@@ -124,10 +121,15 @@ def share(client: Client, run: options.Job, days: Days = None, as_json: options.
     tell(made, f"{client.base_url.rstrip('/')}{made.link}", as_json=as_json)
 
 
-def _word(value: Any) -> str:
-    if value is None:
-        return ""
-    return units.number(value) if isinstance(value, float) else str(value)
+def _word(path: str, value: Any) -> str:
+    return parameter(path, value) if isinstance(value, float) else "" if value is None else str(value)
+
+
+def _told(client: Client, run: RunAnswer) -> dict[str, str]:
+    if run.status is not JobState.SUCCESSFUL:
+        return {}
+    blocks = told_here(run.kind, client.results(run.id).result)
+    return {name: value for block in blocks for name, value in block.pairs}
 
 
 Project = Annotated[str, typer.Argument(metavar="PROJECT", help="Id of a project.")]
@@ -135,12 +137,9 @@ NewName = Annotated[str, typer.Argument(metavar="NAME", help="Name of the projec
 
 
 def show_projects(
-    client: Client,
-    text: Text = None,
-    deleted: Binned = False,
-    limit: Count = None,
+    client: Client, text: Text = None, deleted: Binned = False, limit: Count = None,
     as_json: options.Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """List the projects, newest first."""
     found = listed(client.projects, limit, text=text, deleted=deleted)
     rows = [(one.id, one.name, str(one.runs), f"{one.changed:%Y-%m-%d %H:%M}") for one in found]
