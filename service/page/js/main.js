@@ -87,18 +87,16 @@ async function choose(name) {
   byId("scene-list").querySelector("[aria-current]")?.focus();
 }
 
-// Whether it is still what is wanted, once it is there.
 async function open() {
   screen("scene");
   await learned;
-  if (!(await loadScene(state.scene))) return false;
+  if (!(await loadScene(state.scene))) return;
   const names = variedParts();
   if (!names.includes(state.contact)) Object.assign(state, { contact: names[0] ?? "", variable: "" });
   fillSettings();
   write();
   tell("scene");
   for (const view of STUDIES) resume(view.kind, view);
-  return true;
 }
 
 const forgetAll = () => {
@@ -130,7 +128,7 @@ async function restore() {
   }
   state.scene ||= FIRST;
   sceneList();
-  if (await open()) tell("values");
+  await open();
 }
 
 // A scene that a run brought along, stored under its name or, where that is another's, under one beside it.
