@@ -9,7 +9,6 @@ import typer
 from service.cli.commands.client.job_commands import MOST, listed, tell, tell_list, told_here
 from service.cli.options import parameters as options
 from service.cli.options.inputs import amount, count
-from service.db.models import JobState
 from service.errors import InputError
 from service.rendering.text import print_json, print_table, say
 from solver.scene.parameter_paths import parameter
@@ -126,7 +125,7 @@ def _word(path: str, value: Any) -> str:
 
 
 def _told(client: Client, run: RunAnswer) -> dict[str, str]:
-    if run.status is not JobState.SUCCESSFUL:
+    if run.status.value != "successful":
         return {}
     blocks = told_here(run.kind, client.results(run.id).result)
     return {name: value for block in blocks for name, value in block.pairs}
