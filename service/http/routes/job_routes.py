@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any, ClassVar
@@ -33,6 +33,7 @@ from service.jobs.kind_registry import KIND, JobRequest, Json, Registry, asked_o
 from service.jobs.kinds.bodies import DESIGN, any_body, design_body, examples, examples_of
 from service.queue.core import Results, Service
 from service.schemas import answers
+from solver.results.told import Block
 
 router = APIRouter(prefix="/v1", tags=["jobs"])
 
@@ -114,15 +115,15 @@ def results(job_id: str, context: InContext) -> Response:
 @reading
 def told(job_id: str, context: InContext) -> Response:
     """What people read of what a job computed: numbers with their units, of every kind."""
-    return as_json(told_answer(context.service, context.service.results(job_id, context.caller)))
+    blocks = told_of(context.service, context.service.results(job_id, context.caller))
+    return as_json(answers.ToldAnswer(blocks=list(blocks)))
 
 
-def told_answer(service: Service, found: Results) -> answers.ToldAnswer:
+def told_of(service: Service, found: Results) -> Sequence[Block]:
     """What people read of a result."""
     from service.rendering.text import told
 
-    tell = service.registry.tell_of(found.job.kind)
-    return answers.ToldAnswer(blocks=list(told(found.job.kind, found.result, tell)))
+    return told(found.job.kind, found.result, service.registry.tell_of(found.job.kind))
 
 
 def results_answer(context: Context, job_id: str, caller: Caller) -> Response:

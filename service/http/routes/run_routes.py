@@ -36,7 +36,7 @@ from service.http.dependencies import (
 from service.http.in_lane import reading, writing, writing_files
 from service.http.made_once import Reports
 from service.http.middleware.admission import LINKED
-from service.http.routes.job_routes import results_answer, told_answer
+from service.http.routes.job_routes import results_answer, told_of
 from service.http.routes.stored import SWEEP_FORMS, SweepForm, sweep_answer
 from service.jobs.strict_json import digest
 from service.rendering.representations import JSON, chosen
@@ -393,7 +393,7 @@ def shared_run(context: OfLink) -> Response:
     if run.job.state is JobState.SUCCESSFUL:
         with context.service.database.reading():
             found = context.service.results(run.id, reader)
-            blocks = told_answer(context.service, found).blocks
+            blocks = told_of(context.service, found)
             sweeps = [SweepAnswer.of(one) for one in found.sweeps]
     headers = {"Vary": "Accept", "Content-Security-Policy": POLICY}
     return Response(shared_page(told, blocks, sweeps, context.token), media_type=_PAGE, headers=headers)
