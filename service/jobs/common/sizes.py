@@ -25,7 +25,6 @@ QUICK_DOFS = 500
 FEWEST_STEPS = 256
 """Of a period, where the solver chooses them."""
 MOST_COUPLED = 250  # motions of full matrices; of more a hundred periods take half an hour
-_QUICK_CONTACTS = 24  # of a whole disk; with more one response takes a minute
 MOST_MOTIONS = 40
 """Points of the curve of a mode with loops and shapes."""
 POINTS_OF_A_SWEEP = 20
@@ -129,11 +128,6 @@ def coefficients(scene: Scene, harmonics: int) -> int:
     from solver.scene.scene_harmonics import kept_harmonics
 
     return 2 * len(kept_harmonics(scene, (), harmonics, odd=False)) - 1
-
-
-def is_dear_disk(scene: Scene) -> bool:
-    """Return whether a response in which every sector counts takes a minute."""
-    return scene.structure.sector_count * len(scene.contacts) > _QUICK_CONTACTS
 
 
 def _sectors(scene: Scene) -> int:

@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 from optim.criteria.key import Name
 from service.jobs.common.result_models import Table, answered
 from service.jobs.common.scene_requests import FrequencyHz, HarmonicRequest, stored_scene
-from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues, is_dear_disk
+from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.common.study_keys import band_issues
 from service.jobs.job_parts import Division, JobPart, PartOutput, PartStoppedError
 from service.jobs.kind_registry import Flag, JobKind
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
 _MOST_SAMPLES = 10_000
+_QUICK_CONTACTS = 24  # of a whole disk; with more one response takes a minute
 _MOST_NAMES = 100
 _WORK_OF_A_PART = 4  # sectors × harmonics: 0.1 s, measured on bladed-disk
 _MOST_DIVIDED = 256
@@ -141,7 +142,7 @@ class Mistuning(Study, HarmonicRequest):
         told, sectors = blades_differ(scene), scene.structure.sector_count
         if isinstance(told, str):
             return told
-        few = {"samples": 20, "harmonics": 3} if is_dear_disk(scene) else {}
+        few = {"samples": 20, "harmonics": 3} if sectors * len(scene.contacts) > _QUICK_CONTACTS else {}
         disks = cls.model_construct(None, **few).samples
         return told._replace(body={**told.body, **few}, times=disks * sectors)
 

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from solver.results.told import Told
     from solver.scene.scene import Scene
 
-_HARMONICS = (11, 7, 5, 3)  # proposed are the first with no more unknowns than
-_UNKNOWNS = 1200
+_HARMONICS = (11, 7, 5, 3)
+_UNKNOWNS = 1200  # of a balance that is solved in half a minute: the most harmonics with no more are proposed
 _RESPONSES = 7  # of long periods, at most as many as that
 
 
